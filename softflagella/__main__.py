@@ -95,7 +95,7 @@ def _calibrate(
         table = _filmed(films, view, robot, out)
     from calibration.own_model.model_file import load_model
     from calibration.statistics.budget import stopped_by_interrupt
-    from calibration.statistics.excluded import summary_of_excluded
+    from calibration.table.excluded import summary_of_excluded
     from softflagella.path_error import DEFAULT_PATHS
 
     given, measured = load_model(model, table) if model else (robot, table)

@@ -17,7 +17,7 @@ from calibration.own_model.model_verdict import ModelVerdict
 from calibration.own_model.table_of_runs import Noise, Roles, read_runs_of
 from calibration.statistics.budget import Work, limited
 from calibration.statistics.owned import Owned, read_owned
-from calibration.statistics.statistical_model import lines_of_excluded
+from calibration.table.runs import lines_of_excluded
 from calibration.verdict.calibrate import calibrate as find_what_is_missing
 from common.errors import InputError
 from common.keywords import checks_keywords

@@ -68,16 +68,20 @@ def test_no_files_import_each_other(package: str) -> None:
 
 
 def test_statistics_and_networks_know_no_robot() -> None:
-    """And the swimmer knows no verdict."""
+    """A table knows no model, and the swimmer no verdict."""
     networks = [ROOT / "surrogate" / name for name in ("network.py", "training/bfgs.py", "training/networks.py")]
-    assert rooms_imported("calibration")["statistics"] == rooms_imported("surrogate")["network"] == set()
-    for file in (*(ROOT / "calibration" / "statistics").glob("*.py"), *networks):
+    rooms = rooms_imported("calibration")
+    assert (rooms["linear"], rooms["table"], rooms["statistics"]) == (set(), {"linear"}, {"linear", "table"})
+    assert rooms_imported("surrogate")["network"] == set()
+    below = ("linear", "table", "statistics")
+    engine = [file for room in below for file in (ROOT / "calibration" / room).glob("*.py")]
+    own = (*(f"calibration.{room}" for room in below), "surrogate.network.", "surrogate.training.")
+    for file in (*engine, *networks):
         names = imported(file)
         assert not {name.split(".")[1] for name in names if name.startswith("sim.")} & ROBOTS, file
         others = {name for name in names if not name.startswith(("common.", "sim."))}
-        assert all(name.startswith(("calibration.statistics", "surrogate.network.", "surrogate.training."))
-                   for name in others), file  # fmt: skip
-    assert rooms_imported("calibration")["swimmer"] == {"statistics"}
+        assert all(name.startswith(own) for name in others), file
+    assert rooms["swimmer"] == set(below)
     for file in (ROOT / "calibration").rglob("*.py"):
         assert not {name.split(".")[0] for name in imported(file)} & {"planner", "tracking"}, file
 

@@ -12,9 +12,9 @@ from __future__ import annotations
 import time
 
 from benchmarks.common import heading, in_parallel, per_cent, row
-from calibration.statistics.between_repeats import find_differences
 from calibration.statistics.study import LEVEL
 from calibration.swimmer.measured_table import read_measurements
+from calibration.table.between_repeats import find_differences
 from tests.oracles.misread_tables import CASES, Case, make_table
 
 

@@ -16,13 +16,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from calibration.linear.gls import Noise
 from calibration.statistics.forward import derivatives, linear
-from calibration.statistics.gls import Noise
 from calibration.statistics.statistical_model import (
     Parameter,
     Parameters,
     Predict,
-    Runs,
     Value,
     precisions,
     start_values,
@@ -30,6 +29,7 @@ from calibration.statistics.statistical_model import (
 from calibration.statistics.study import middle_session
 from calibration.swimmer.measured_table import Measurements, read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
+from calibration.table.runs import Runs
 from common.arrays import Flags, Floats, Integers
 from sim.model.presets import PRESETS
 

@@ -27,10 +27,11 @@ import numpy as np
 
 from calibration.attribution.hypothesis import Hypothesis
 from calibration.attribution.rules import RULES, Trial, doubted
+from calibration.linear.gls import schur_complement
 from calibration.statistics.fit import Fit
-from calibration.statistics.gls import schur_complement
-from calibration.statistics.statistical_model import Runs, regression
+from calibration.statistics.statistical_model import regression
 from calibration.statistics.study import Study, held_out_p_value
+from calibration.table.runs import Runs
 from common.arrays import Flags, Floats
 
 SEEN = 6.0  # standard deviations of a remainder that the tests notice nearly always

@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import stdtrit
 
+from calibration.linear.gls import Noise, solve_normal
 from calibration.statistics.fit import Fit
-from calibration.statistics.gls import Noise, solve_normal
 from calibration.statistics.signed_ranks import signed_rank_p
 from calibration.statistics.study import Study, groups, leave_one_group_out
 from common.arrays import Floats, Integers

@@ -34,8 +34,9 @@ from calibration.statistics.budget import skipped
 from calibration.statistics.fit import Fit, UnsolvedError, birge, fit
 from calibration.statistics.residual_tests import TESTABLE, Directions, examine_residual
 from calibration.statistics.shifted import Shift, Shifted
-from calibration.statistics.statistical_model import Experiment, Parameter, Runs
+from calibration.statistics.statistical_model import Experiment, Parameter
 from calibration.statistics.study import Study
+from calibration.table.runs import Runs
 from common.arrays import Flags, Integers
 
 _MOST = 2  # numbers that move

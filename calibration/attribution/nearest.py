@@ -48,10 +48,10 @@ from calibration.attribution.forms import as_good, at_theory
 from calibration.attribution.hypothesis import Evidence, Hypothesis, Origin, Reason
 from calibration.attribution.left_out import gain_of_residuals, left_out_residuals
 from calibration.attribution.rules import RULES, Trial, judge
+from calibration.linear.gls import schur_complement, solve_normal
 from calibration.statistics.budget import skipped, spent
 from calibration.statistics.fit import Fit, UnsolvedError, birge, fit, profile_end
 from calibration.statistics.forward import derivatives
-from calibration.statistics.gls import schur_complement, solve_normal
 from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, examine_residual
 from calibration.statistics.shifted import Shift, Shifted
 from calibration.statistics.statistical_model import (
@@ -59,12 +59,12 @@ from calibration.statistics.statistical_model import (
     ForwardModel,
     Parameter,
     Parameters,
-    Runs,
     prior_offsets,
     regression,
     start_values,
 )
 from calibration.statistics.study import FinalRefit, Study
+from calibration.table.runs import Runs
 from common.arrays import Flags, Floats, Integers
 
 _DIFFERS = 2.71  # ½ χ²₁ at 5 %

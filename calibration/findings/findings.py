@@ -20,11 +20,12 @@ from calibration.attribution.rules import REJECTED
 from calibration.attribution.wrong_numbers import wrong_number
 from calibration.findings.held_out import HeldOutErrors
 from calibration.findings.next_runs import Batch, Explanation, NextRun
-from calibration.statistics.between_repeats import Difference
-from calibration.statistics.excluded import Excluded, count_of_rows, summary_of_excluded
 from calibration.statistics.fit import Fit, Pull
-from calibration.statistics.statistical_model import Parameter, Runs
+from calibration.statistics.statistical_model import Parameter
 from calibration.statistics.study import FinalRefit, Split
+from calibration.table.between_repeats import Difference
+from calibration.table.excluded import Excluded, count_of_rows, summary_of_excluded
+from calibration.table.runs import Runs
 from common.arrays import Floats
 
 _HALF = 0.5  # of an error on left-out runs

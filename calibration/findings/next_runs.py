@@ -34,9 +34,10 @@ import numpy as np
 from scipy.special import ndtr
 
 from calibration.attribution.hypothesis import Hypothesis
+from calibration.linear.gls import Noise
 from calibration.statistics.forward import derivatives
-from calibration.statistics.gls import Noise
-from calibration.statistics.statistical_model import Experiment, ForwardModel, Runs, start_values
+from calibration.statistics.statistical_model import Experiment, ForwardModel, start_values
+from calibration.table.runs import Runs
 from common.arrays import Flags, Floats
 from common.errors import InputError
 from common.reading import expecting, read_json

@@ -16,11 +16,12 @@ from calibration.attribution.nearest import largest_along, size_interval
 from calibration.attribution.rules import UNSEEN, refuting, shift_of
 from calibration.attribution.wrong_numbers import notable_pull
 from calibration.findings.findings import Findings
-from calibration.statistics.between_repeats import Difference
-from calibration.statistics.excluded import count_of_rows
+from calibration.linear.gls import inverse_root
 from calibration.statistics.fit import Fit, Pull, least_determined
-from calibration.statistics.gls import inverse_root
-from calibration.statistics.statistical_model import Parameter, Runs
+from calibration.statistics.statistical_model import Parameter
+from calibration.table.between_repeats import Difference
+from calibration.table.excluded import count_of_rows
+from calibration.table.runs import Runs
 from calibration.words.quantities import difference_in_words, move_in_words
 from calibration.words.render import next_steps, sentence
 from common.provenance import provenance

@@ -23,8 +23,8 @@ import numpy as np
 
 from calibration.laws.law_model import SIZE, LawModel
 from calibration.laws.readings import EXPONENTS, INPUTS, logarithms
+from calibration.linear.gls import Regression, schur_complement
 from calibration.statistics.fit import Fit
-from calibration.statistics.gls import Regression, schur_complement
 from calibration.statistics.statistical_model import precisions, prior_offsets
 from common.arrays import Flags, Floats
 

@@ -7,7 +7,7 @@ exponents are within their bounds.
 
 **Linear models**, for many residuals at once. A model has the p columns J of the coefficients and nuisance
 parameters and q columns X of one place. Each residual has its own S, and each place the scatter of sessions that
-all of its columns leave (`calibration.statistics.gls`). With this Σ the J are absorbed once for all models of a
+all of its columns leave (`calibration.linear.gls`). With this Σ the J are absorbed once for all models of a
 place,
 
     C = Xᵀ Σ⁻¹ X − Xᵀ Σ⁻¹ J A⁻¹ Jᵀ Σ⁻¹ X,   b = Xᵀ Σ⁻¹ r − Xᵀ Σ⁻¹ J A⁻¹ Jᵀ Σ⁻¹ r,   A = Jᵀ Σ⁻¹ J + P⁻¹,
@@ -37,9 +37,9 @@ import numpy as np
 from calibration.laws.law_model import LEVER, lever_arms, moved_parameter
 from calibration.laws.places import Place
 from calibration.laws.readings import EXPONENTS, logarithms, noted_values, parameter_of
+from calibration.linear.gls import Regression, schur_complement, solve_normal
 from calibration.statistics.fit import Fit
 from calibration.statistics.forward import derivatives
-from calibration.statistics.gls import Regression, schur_complement, solve_normal
 from calibration.statistics.statistical_model import precisions, prior_offsets
 from calibration.swimmer.swimmer import SwimmerModel
 from common.arrays import Flags, Floats, Integers

@@ -6,10 +6,11 @@ from itertools import combinations, product
 
 import numpy as np
 
+from calibration.linear.gls import repeat_count
 from calibration.own_model.function_model import NOT_ABOVE_0, FunctionModel, evaluate
-from calibration.statistics.checks import refuse_equal_repeats
-from calibration.statistics.gls import repeat_count
-from calibration.statistics.statistical_model import FEWEST_REPEATS, Parameter, start_values
+from calibration.statistics.statistical_model import Parameter, start_values
+from calibration.table.checks import refuse_equal_repeats
+from calibration.table.runs import FEWEST_REPEATS
 from common.arrays import Flags, Floats
 from common.errors import InputError
 

@@ -14,7 +14,8 @@ from tqdm import tqdm
 from calibration.own_model.declared import Model
 from calibration.statistics.budget import count_predictions, spent, waiting
 from calibration.statistics.forward import secants
-from calibration.statistics.statistical_model import Parameter, Parameters, Predict, Runs
+from calibration.statistics.statistical_model import Parameter, Parameters, Predict
+from calibration.table.runs import Runs
 from common.arrays import Flags, Floats, Integers
 from common.errors import InputError
 

@@ -15,6 +15,7 @@ from typing import Literal, NamedTuple, cast
 import numpy as np
 import pandas as pd
 
+from calibration.linear.gls import repeat_count
 from calibration.own_model.checks import check_function
 from calibration.own_model.declared import Model
 from calibration.own_model.function_model import (
@@ -24,11 +25,10 @@ from calibration.own_model.function_model import (
     evaluate,
     within_half_a_turn,
 )
-from calibration.statistics.excluded import MANY, Faults
-from calibration.statistics.gaps import filled, gaps_in_words, is_missing, with_outputs, without_gaps
-from calibration.statistics.gls import repeat_count
-from calibration.statistics.statistical_model import FEWEST_REPEATS
 from calibration.statistics.study import middle_session
+from calibration.table.excluded import MANY, Faults
+from calibration.table.gaps import filled, gaps_in_words, is_missing, with_outputs, without_gaps
+from calibration.table.runs import FEWEST_REPEATS
 from common.arrays import Flags, Floats, Integers, Words
 from common.errors import InputError, naming
 from common.quantities import convert_columns, numbers_of

@@ -24,7 +24,8 @@ from calibration.laws.law_model import LEVER, law_model
 from calibration.laws.places import Place
 from calibration.report.path_error import WORDS, Model, PathError
 from calibration.statistics.residual_tests import Misfit
-from calibration.statistics.statistical_model import Parameter, Runs
+from calibration.statistics.statistical_model import Parameter
+from calibration.table.runs import Runs
 from calibration.words.quantities import feature_in_words, final_model
 from common.arrays import Flags, Floats
 from common.pages import BLUE, GREEN, INK, ORANGE, PALE, RED, VIOLET

@@ -13,8 +13,8 @@ import pandas as pd
 from calibration.findings.samples import open_forms
 from calibration.report.path_error import PathError
 from calibration.robot.corrected_robot import as_toml, handed_on, law_handed_on
-from calibration.statistics.statistical_model import lines_of_excluded
 from calibration.swimmer.measured_table import PROTOCOLS, Measurements, read_measurements
+from calibration.table.runs import lines_of_excluded
 from calibration.verdict.verdict import Verdict
 from common.arrays import Flags
 from sim.knowledge import CalibrationKnowledge

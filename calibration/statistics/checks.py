@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 
-from calibration.statistics.gls import repeat_covariance
-from calibration.statistics.statistical_model import ForwardModel, Runs, start_values
-from common.arrays import Floats, Integers
+from calibration.statistics.statistical_model import ForwardModel, start_values
+from calibration.table.runs import Runs
+from common.arrays import Floats
 from common.errors import InputError
 
 _ALIKE = 0.2  # share of the scatter that is left where a logarithm was forgotten
-_ROUNDING = 1e-24  # variance of repeats that are equal, over the mean square
 
 
 def names_once(names: Iterable[str]) -> None:
@@ -21,16 +20,6 @@ def names_once(names: Iterable[str]) -> None:
     for name, count in Counter(names).items():
         if count > 1:
             raise InputError(f"two numbers or effects of the model have the name {name!r}; rename or drop one")
-
-
-def refuse_equal_repeats(runs: Runs, repeated: Integers | Floats, columns: Sequence[str]) -> None:
-    """Refuse an output that is the same in all repeats, from which its noise cannot be estimated."""
-    variances = np.diag(repeat_covariance(runs.y, repeated))
-    for place in np.flatnonzero(variances <= _ROUNDING * np.mean(runs.y**2, 0))[:1].tolist():
-        raise InputError(
-            f"{columns[place]} is the same in all repeats; drop copies of rows, give unrounded values, or leave "
-            "it out"
-        )
 
 
 def predict_as_given(model: ForwardModel, *, title: str = "") -> Floats:

@@ -7,7 +7,7 @@ the bounds (Stark and Parker 1995, `scipy.optimize.lsq_linear`):
 
     least |W^½ (r − J s)|² + λ |D⁻¹ s|² over steps s,   low ≤ θ + s ≤ high.
 
-W is Σ⁻¹ but for the mean of all sessions (`calibration.statistics.gls`). D is 1 for ln C and a typical size for ε.
+W is Σ⁻¹ but for the mean of all sessions (`calibration.linear.gls`). D is 1 for ln C and a typical size for ε.
 λ is 0, unless the step is too long or does not improve the fit; then the step is bent along the curvature of the
 model. A parameter that the runs pull against a bound is *held* there: it is no direction of tests or of the
 covariance, which is V = A⁻¹, A = JᵀWJ, of the others, times a factor because S is estimated (`_inflation`).
@@ -18,7 +18,7 @@ are 95 %, by Student's t. The scatter ρ of a few sessions is uncertain, which l
     ν = 2 V² / Σ_a V′_a² Var ρ_a,   Var ρ_a ≈ 2 (ρ_a + 1/n)² / (s − 1),   n runs in each of s sessions.
 
 V′_a is half of the derivative by ρ_a and half of its mean over the outputs, since half of each ρ_a is estimated
-from all outputs (`calibration.statistics.gls`).
+from all outputs (`calibration.linear.gls`).
 
 The deviance along one parameter, with the others refitted, may differ from a parabola. So `profile_intervals` runs
 the model at both ends of the interval that the covariance gives. Each end moves to where the deviance, as a
@@ -39,25 +39,25 @@ import numpy as np
 from scipy.optimize import brentq, lsq_linear
 from scipy.special import stdtrit
 
-from calibration.statistics.budget import limited_as_one, skipped, spent
-from calibration.statistics.forward import derivatives
-from calibration.statistics.gls import (
+from calibration.linear.gls import (
     Noise,
     NormalEquations,
     inverse_root,
     schur_complement,
     solve_normal,
 )
+from calibration.statistics.budget import limited_as_one, skipped, spent
+from calibration.statistics.forward import derivatives
 from calibration.statistics.statistical_model import (
     ForwardModel,
     Parameter,
     Parameters,
-    Runs,
     apply_step,
     parameter,
     prior_offsets,
     regression,
 )
+from calibration.table.runs import Runs
 from common.arrays import Flags, Floats
 from common.errors import InputError
 

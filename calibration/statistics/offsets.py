@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from calibration.statistics.between_repeats import Difference, find_differences
 from calibration.statistics.forward import stacked
 from calibration.statistics.statistical_model import Experiment, Parameter, Parameters, Predict, Wrapped, with_runs
 from calibration.statistics.study import middle_session
+from calibration.table.between_repeats import Difference, find_differences
 from common.arrays import Flags, Floats
 
 _LARGEST = 5.0  # of y

@@ -38,26 +38,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calibration.statistics.budget import skipped
-from calibration.statistics.fit import LEARNT, Fit
-from calibration.statistics.forward import derivatives
-from calibration.statistics.gls import (
+from calibration.linear.gls import (
     NormalEquations,
     averaging_rows,
     inverse_root,
     schur_complement,
     solve_normal,
 )
-from calibration.statistics.statistical_model import (
-    ForwardModel,
-    Parameter,
-    Parameters,
-    Runs,
-    features,
-    prior_offsets,
-    regression,
-)
+from calibration.statistics.budget import skipped
+from calibration.statistics.fit import LEARNT, Fit
+from calibration.statistics.forward import derivatives
+from calibration.statistics.statistical_model import ForwardModel, Parameter, Parameters, prior_offsets, regression
 from calibration.statistics.study import Study
+from calibration.table.runs import Runs, features
 from common.arrays import Flags, Floats, Integers
 
 TESTABLE = 0.03  # an effect cannot be tested if less than this share of its signal survives the projection

@@ -21,10 +21,11 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtri, stdtrit
 
-from calibration.statistics.excluded import Excluded
+from calibration.linear.gls import inverse_root, square_root
 from calibration.statistics.fit import Fit
-from calibration.statistics.gls import inverse_root, square_root
-from calibration.statistics.statistical_model import ForwardModel, Parameter, Runs, regression
+from calibration.statistics.statistical_model import ForwardModel, Parameter, regression
+from calibration.table.excluded import Excluded
+from calibration.table.runs import Runs
 from common.arrays import Flags, Floats, Integers
 
 LEVEL = 0.04  # α of every claim; below 0.05, because the noise is estimated and false claims must stay below 5 %

@@ -31,11 +31,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from calibration.statistics.excluded import listed
+from calibration.linear.gls import Noise, inverse_root
 from calibration.statistics.fit import Fit, fit
-from calibration.statistics.gls import Noise, inverse_root
-from calibration.statistics.statistical_model import FEWEST_REPEATS, Runs, with_runs
+from calibration.statistics.statistical_model import with_runs
 from calibration.statistics.study import Study
+from calibration.table.excluded import listed
+from calibration.table.runs import FEWEST_REPEATS, Runs
 from common.arrays import Floats, Integers
 
 _RATIOS = (9.0, 25.0, 100.0)  # c²

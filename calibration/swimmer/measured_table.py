@@ -11,9 +11,9 @@ so; without these the noise is unknown. `session` names the group of runs that w
 runs of one N are one session. `robot` names the specimen, where the table has several. Some effects need
 elapsed_min, temperature_C, tank_diameter_cm or course_deg (direction of the path in the lab, where a run is part
 of a circle). Rows that cannot be used are excluded with number and reason, and so are copies of rows
-(`calibration.statistics.excluded`), and rows that lack a note which nearly all others have. A row that lacks some
-outputs counts with the others (`calibration.statistics.gaps`). Columns without any value are left out, and notes
-that many rows lack. Columns of other names are tested as groupings (`calibration.statistics.between_repeats`) or
+(`calibration.table.excluded`), and rows that lack a note which nearly all others have. A row that lacks some
+outputs counts with the others (`calibration.table.gaps`). Columns without any value are left out, and notes
+that many rows lack. Columns of other names are tested as groupings (`calibration.table.between_repeats`) or
 left out; a name that looks like a misspelt one is refused.
 
 Observations are compared on a relative scale: y = ln |output| for spins, yaw rate and radius, and θ in radians. A
@@ -38,14 +38,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from calibration.statistics.between_repeats import usable
-from calibration.statistics.checks import refuse_equal_repeats
-from calibration.statistics.excluded import COPY, Excluded, Faults
-from calibration.statistics.gaps import filled, gaps_in_words, with_outputs, without_gaps
-from calibration.statistics.gls import repeat_count, repeat_covariance
-from calibration.statistics.statistical_model import FEWEST_REPEATS, Runs
+from calibration.linear.gls import repeat_count, repeat_covariance
 from calibration.statistics.study import divided, middle_session
 from calibration.swimmer.influences import CAMERA, HEADING, TACHOMETER
+from calibration.table.between_repeats import usable
+from calibration.table.checks import refuse_equal_repeats
+from calibration.table.excluded import COPY, Excluded, Faults
+from calibration.table.gaps import filled, gaps_in_words, with_outputs, without_gaps
+from calibration.table.runs import FEWEST_REPEATS, Runs
 from common.arrays import Flags, Floats, Integers
 from common.errors import InputError, naming
 from common.quantities import numbers_of

@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from calibration.linear.gls import Noise, repeat_covariance
 from calibration.statistics.budget import count_predictions
 from calibration.statistics.forward import either_side, secants, stacked
-from calibration.statistics.gls import Noise, repeat_covariance
 from calibration.statistics.owned import Owned
 from calibration.statistics.statistical_model import Parameter, Parameters, Predict
 from calibration.swimmer.influences import (

@@ -1,7 +1,7 @@
 """The whole calibration: prepare, explain, describe, and conclude, with the held-out test opened once.
 
 0. Repeats are compared by what the model does not know, and columns with each other
-   (`calibration.statistics.between_repeats`). What differs becomes a number of every fit.
+   (`calibration.table.between_repeats`). What differs becomes a number of every fit.
 1. Whole sessions are held out before any run is compared with the model (by default the middle one).
    Outliers are excluded (`calibration.statistics.study`).
 2. The coefficients and the nuisance parameters are fitted to the other sessions, with weights of the runs if
@@ -37,7 +37,6 @@ from calibration.findings.held_out import HeldOutErrors, held_out_errors
 from calibration.findings.next_runs import Explanation, next_runs
 from calibration.statistics.budget import Work, beginning, limited, skipped
 from calibration.statistics.checks import predict_as_given
-from calibration.statistics.excluded import caveat_of_excluded, count_of_rows
 from calibration.statistics.fit import Fit, UnsolvedError, birge, profile_end, profile_intervals
 from calibration.statistics.offsets import Offsets, with_differences
 from calibration.statistics.statistical_model import Experiment, ForwardModel, start_values, with_runs
@@ -51,7 +50,6 @@ from calibration.statistics.study import (
     find_outliers,
     split_runs,
 )
-from calibration.statistics.unit_slips import refuse_unit_slips
 from calibration.statistics.weights import (
     alike,
     caveat_of_weights,
@@ -59,6 +57,8 @@ from calibration.statistics.weights import (
     noise_of_any_run,
     rows_of_little_weight,
 )
+from calibration.table.excluded import caveat_of_excluded, count_of_rows
+from calibration.table.unit_slips import refuse_unit_slips
 from calibration.verdict.describe import adopt_in_turns, forms_in_question
 from calibration.verdict.explain import explain_and_refute, fit_moves
 from calibration.verdict.verdict import Verdict

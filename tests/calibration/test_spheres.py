@@ -11,10 +11,10 @@ import pandas as pd
 import pytest
 
 import softflagella as sf
+from calibration.linear.gls import Noise
 from calibration.own_model.function_model import FunctionModel
 from calibration.own_model.table_of_runs import Roles, read_runs_of
 from calibration.statistics.fit import fit, profile_intervals
-from calibration.statistics.gls import Noise
 from calibration.statistics.statistical_model import start_values
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict import Verdict

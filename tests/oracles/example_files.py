@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from calibration.findings.next_runs import Explanation
-from calibration.statistics.gls import Noise
+from calibration.linear.gls import Noise
 from common.provenance import fingerprint
 from dataset.data_set import sweep_key
 from dataset.schema import rows_version

@@ -14,10 +14,10 @@ import pandas as pd
 import pytest
 
 from calibration.attribution.moves import find_moves, groups_that_may_differ
+from calibration.linear.gls import repeat_count, repeat_covariance
 from calibration.robot.robot_verdict import RobotVerdict
 from calibration.statistics.fit import fit
 from calibration.statistics.forward import by_differences, derivatives
-from calibration.statistics.gls import repeat_count, repeat_covariance
 from calibration.statistics.shifted import Shift, Shifted
 from calibration.statistics.statistical_model import Parameter, start_values
 from calibration.statistics.study import Study

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from calibration.laws.search import LinearModels
-from calibration.statistics.gls import UNKNOWN_SHARE, Noise, Regression, repeat_covariance
+from calibration.linear.gls import UNKNOWN_SHARE, Noise, Regression, repeat_covariance
 from common.arrays import Floats
 
 SESSION = np.repeat([0, 1, 2, 3], [6, 8, 6, 4])

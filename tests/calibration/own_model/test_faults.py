@@ -15,7 +15,8 @@ import pytest
 import softflagella as sf
 from calibration.own_model.table_of_runs import Roles, read_runs_of
 from calibration.statistics.forward import secants
-from calibration.statistics.statistical_model import Parameter, Runs
+from calibration.statistics.statistical_model import Parameter
+from calibration.table.runs import Runs
 from calibration.verdict.calibrate import calibrate
 from common.errors import InputError
 

@@ -17,6 +17,7 @@ import pytest
 from scipy.stats import binom
 
 from calibration.attribution import effects
+from calibration.linear.gls import repeat_covariance
 from calibration.statistics import budget
 from calibration.statistics.budget import (
     Work,
@@ -29,12 +30,10 @@ from calibration.statistics.budget import (
     stopped_by_interrupt,
     work_done,
 )
-from calibration.statistics.excluded import Excluded, caveat_of_excluded, count_of_rows, summary_of_excluded
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.forward import derivatives
-from calibration.statistics.gls import repeat_covariance
 from calibration.statistics.residual_tests import Directions, examine_residual
-from calibration.statistics.statistical_model import Parameter, Parameters, Predict, Runs, start_values
+from calibration.statistics.statistical_model import Parameter, Parameters, Predict, start_values
 from calibration.statistics.study import (
     Study,
     error_interval,
@@ -49,6 +48,8 @@ from calibration.statistics.weights import (
     noise_of_any_run,
     rows_of_little_weight,
 )
+from calibration.table.excluded import Excluded, caveat_of_excluded, count_of_rows, summary_of_excluded
+from calibration.table.runs import Runs
 from calibration.words.render import next_steps
 from common.arrays import Flags, Floats, Integers
 from tests.calibration.own_model.test_faults import hand_made

@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.statistics.excluded import find_copies
-from calibration.statistics.gls import repeat_count, repeat_covariance
+from calibration.linear.gls import repeat_count, repeat_covariance
 from calibration.swimmer.measured_table import read_measurements
+from calibration.table.excluded import find_copies
 from common.errors import InputError
 from tests.calibration.toy_tables import calibrated, none, toy_table
 from tests.processes import LIMIT

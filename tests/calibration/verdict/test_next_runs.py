@@ -28,7 +28,7 @@ from calibration.findings.next_runs import (
     read_explanations,
     standings,
 )
-from calibration.statistics.gls import Noise
+from calibration.linear.gls import Noise
 from calibration.statistics.statistical_model import Parameter
 from common.errors import InputError
 from tests.calibration.toy_tables import DRAG, ambiguous, toy_swimmer, toy_table

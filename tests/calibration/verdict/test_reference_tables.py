@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calibration.linear.gls import repeat_covariance
 from calibration.own_model.function_model import FunctionModel
 from calibration.report.report import write_report
-from calibration.statistics.gls import repeat_covariance
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate

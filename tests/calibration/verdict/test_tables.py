@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.statistics.gls import UNKNOWN_SHARE
+from calibration.linear.gls import UNKNOWN_SHARE
 from calibration.statistics.study import middle_session
 from calibration.swimmer.measured_table import PROTOCOLS, read_measurements
 from common.errors import InputError, run_command

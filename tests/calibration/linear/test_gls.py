@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibration.statistics.gls import (
+from calibration.linear.gls import (
     Noise,
     Regression,
     inverse_root,
@@ -17,8 +17,9 @@ from calibration.statistics.gls import (
     solve_normal,
 )
 from calibration.statistics.residual_tests import TESTABLE, Directions, _kernel, directions, examine_residual
-from calibration.statistics.statistical_model import features, precisions, prior_offsets
+from calibration.statistics.statistical_model import precisions, prior_offsets
 from calibration.statistics.study import Study, middle_session
+from calibration.table.runs import features
 from common.arrays import Floats
 from tests.calibration.toy_tables import fit_all, toy_swimmer, toy_table
 

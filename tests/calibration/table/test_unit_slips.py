@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibration.statistics.statistical_model import Runs
-from calibration.statistics.unit_slips import refuse_unit_slips
+from calibration.table.runs import Runs
+from calibration.table.unit_slips import refuse_unit_slips
 from common.arrays import Floats
 from common.errors import InputError
 

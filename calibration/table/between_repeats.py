@@ -30,9 +30,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.special import fdtrc, ndtri
 
-from calibration.statistics.gaps import is_missing
-from calibration.statistics.gls import repeat_count
-from calibration.statistics.statistical_model import FEWEST_REPEATS, Runs
+from calibration.linear.gls import repeat_count
+from calibration.table.gaps import is_missing
+from calibration.table.runs import FEWEST_REPEATS, Runs
 from common.arrays import Flags, Floats, Integers
 
 SHARE_OF_LEVEL = 0.25  # of the level of a claim: 1 % beside the 4 % of all tests with the model

@@ -12,7 +12,7 @@ a slip where
 
 - the runs of the session agree on it: its standard error is at most half of `_NEAR`;
 - it is that between the units, to three standard deviations of a session, which scatters as a single run does
-  (`calibration.statistics.gls`), but not beyond `_NEAR`;
+  (`calibration.linear.gls`), but not beyond `_NEAR`;
 - no other output of the session has the same factor or its inverse, as a robot that moves ten times as fast would.
 """
 
@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from calibration.statistics.statistical_model import Runs
+from calibration.table.runs import Runs
 from common.arrays import Flags, Floats
 from common.errors import InputError
 

@@ -11,11 +11,11 @@ import pytest
 from calibration.attribution.hypothesis import Hypothesis, Origin
 from calibration.findings.next_runs import Explanation
 from calibration.report.report import sections
-from calibration.statistics.between_repeats import Difference, find_differences, usable
 from calibration.statistics.offsets import Offsets, with_differences
 from calibration.statistics.statistical_model import start_values
 from calibration.statistics.study import LEVEL
 from calibration.swimmer.measured_table import Measurements, read_measurements
+from calibration.table.between_repeats import Difference, find_differences, usable
 from calibration.words.render import next_steps
 from tests.calibration.toy_tables import calibrated, fit_all, toy_swimmer, toy_table, verdict_of
 from tests.oracles.misread_tables import CASES, Case, make_table

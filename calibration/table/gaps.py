@@ -9,9 +9,9 @@ from typing import TypeVar
 import numpy as np
 import pandas as pd
 
-from calibration.statistics.excluded import Excluded, listed
-from calibration.statistics.gls import repeat_count, repeat_covariance
-from calibration.statistics.statistical_model import FEWEST_REPEATS, Runs
+from calibration.linear.gls import repeat_count, repeat_covariance
+from calibration.table.excluded import Excluded, listed
+from calibration.table.runs import FEWEST_REPEATS, Runs
 from common.arrays import Flags, Floats, Integers, Words
 from common.tables import row_name
 

@@ -1,0 +1,1 @@
+"""Least squares with a scatter of the sessions, and the scatter between repeats."""
