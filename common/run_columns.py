@@ -10,7 +10,7 @@ import difflib
 from typing import TYPE_CHECKING, NamedTuple
 
 from common.errors import InputError
-from common.units import UNITS, convert, split, to_si
+from common.units import guess_slip, other_units, to_si
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,18 +59,7 @@ OUTPUTS = {
 }
 _NEAR = 1.6  # factor between an output in another unit and what the robot does
 OFF = 10 / _NEAR  # factor of an output: of what is ten times too large or too small
-_USUAL = ("rpm", "rad_s", "deg_s", "rps", "mm", "cm", "m", "deg", "rad", "mm_s", "cm_s", "m_s", "cm_min")
-
-
-def _other_units(column: str) -> dict[str, float]:
-    """Return what the numbers of a column are multiplied by if they are in another usual unit."""
-    unit = split(column).unit
-    assert unit is not None
-    others = [UNITS[suffix] for suffix in _USUAL if suffix != unit.suffix]
-    return {other.text: convert(1.0, unit.suffix, other.suffix) for other in others if other.kind == unit.kind}
-
-
-OTHER_UNITS = {output: _other_units(column) for output, (column, _, _) in OUTPUTS.items()}
+OTHER_UNITS = {name: other_units(column.removeprefix(f"{name}_")) for name, (column, _, _) in OUTPUTS.items()}
 
 
 def convert_measured(table: pd.DataFrame, where: str) -> Converted:
@@ -104,12 +93,11 @@ def check_factor(output: str, factor: float, otherwise: str = "") -> None:
         InputError: the output seems to be in another unit.
     """
     column = OUTPUTS[output][0]
-    for unit, wrong in OTHER_UNITS[output].items():
-        if 1 / _NEAR < factor / wrong < _NEAR:
-            raise InputError(
-                f"{column} is {factor:.3g} times what the robot as given does: it seems to be in {unit}; "
-                f"convert it, or correct the coefficients in robot.toml if its unit is right{otherwise}"
-            )
+    if unit := guess_slip(factor, OTHER_UNITS[output], _NEAR):
+        raise InputError(
+            f"{column} is {factor:.3g} times what the robot as given does: it seems to be in {unit}; "
+            f"convert it, or correct the coefficients in robot.toml if its unit is right{otherwise}"
+        )
     if not 1 / OFF < factor < OFF:
         raise InputError(
             f"{column} is {factor:.3g} times what the robot as given does; "

@@ -12,11 +12,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from functools import cache
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple, TypeVar, get_args
 
 from common.errors import InputError
+
+Slip = TypeVar("Slip")
 
 
 class Unit(NamedTuple):
@@ -97,6 +99,18 @@ _SPELLINGS = {  # other spellings of units, after signs have become underscores
     "cm_s^-1": "cm_s", "mm_s^-1": "mm_s", "Pas": "Pa_s", "mPas": "mPa_s", "degC": "C", "degF": "F", "%": "percent",
     "-": "1", "": "1",
 }  # fmt: skip
+SLIPS = {  # factor between two units -> what a larger number is in, and what the smaller one is in
+    6.0: ("deg/s", "rpm"),
+    2 * math.pi: ("rad", "turns"),
+    30 / math.pi: ("rpm", "rad/s"),
+    10.0: ("mm", "cm"),
+    180 / math.pi: ("degrees", "radians"),
+    60.0: ("s or 1/min", "min or 1/s"),
+    100.0: ("cm or per cent", "m or 1"),
+    360.0: ("degrees", "turns"),
+    1000.0: ("mm", "m"),
+}
+_USUAL = ("rpm", "rad_s", "deg_s", "rps", "mm", "cm", "m", "deg", "rad", "mm_s", "cm_s", "m_s", "cm_min")
 _MOST_PARTS = max(len(suffix.split("_")) for suffix in UNITS)  # of a suffix
 _KINEMATIC = re.compile(r"(?:^|[_ \[(])(?:c?St|[cm]?m(?:\^?2|²)(?:[_/]s|[_ ]?s(?:\^-|⁻)[1¹]))[\])]?$")
 _SIGNS = str.maketrans({"°": "deg", "º": "deg", "µ": "u", "μ": "u", "/": "_", "·": "_", "*": "_", " ": "_",
@@ -175,6 +189,23 @@ def convert(value: Any, given: str, wanted: str) -> Any:
     if UNITS[given].kind != UNITS[wanted].kind:
         raise ValueError(f"{given} is a unit of {UNITS[given].kind}, {wanted} one of {UNITS[wanted].kind}")
     return from_si(to_si(value, given), wanted)
+
+
+def other_units(suffix: str) -> dict[float, str]:
+    """Map the factors by which numbers are larger in other usual units of a kind to these units."""
+    others = [other for other in _USUAL if other != suffix and UNITS[other].kind == UNITS[suffix].kind]
+    return {convert(1.0, suffix, other): UNITS[other].text for other in others}
+
+
+def guess_slip(factor: float, slips: Mapping[float, Slip], near: float) -> Slip | None:
+    """Guess why numbers are `factor` times what they should be: what has the nearest factor, within `near`.
+
+    Example:
+        >>> guess_slip(99.0, other_units("m"), near=1.1)
+        'cm'
+    """
+    within = [each for each in slips if 1 / near < factor / each < near]
+    return slips[min(within, key=lambda each: abs(math.log(factor / each)))] if within else None
 
 
 def format_time(seconds: float) -> str:

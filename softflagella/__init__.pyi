@@ -2,7 +2,6 @@
 from calibration.api import decide as decide
 from calibration.findings.next_runs import Decision as Decision
 from calibration.own_model.declared import Model as Model
-from calibration.own_model.declared import ModelEffect
 from calibration.own_model.declared import Number as Number
 from calibration.own_model.declared import Output as Output
 from calibration.own_model.model_verdict import ModelVerdict as ModelVerdict
@@ -68,7 +67,6 @@ from tracking.tracks import check as check
 
 effects = catalogue
 read_sweep = read
-Effect = ModelEffect
 Vehicle = MeasuredVehicle
 __all__: list[str]
 

@@ -166,11 +166,24 @@ def test_bars_are_for_terminals() -> None:
                     assert re.search("or None|=None|^None$|isatty", where), f"{file}: {ast.unparse(node)}"
 
 
-def test_a_class_has_a_name_of_its_own() -> None:
+@pytest.mark.parametrize("package", [*ORDER, "tests", "benchmarks"])
+def test_a_class_has_a_name_of_its_own(package: str) -> None:
+    """In its package."""
     homes: defaultdict[str, list[str]] = defaultdict(list)
-    for package in (*ORDER, "tests", "benchmarks"):
-        for file in (ROOT / package).rglob("*.py"):
-            for node in ast.walk(ast.parse(file.read_text())):
-                if isinstance(node, ast.ClassDef):
-                    homes[node.name].append(f"{file.relative_to(ROOT)}:{node.lineno}")
+    for file in (ROOT / package).rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.ClassDef):
+                homes[node.name].append(f"{file.relative_to(ROOT)}:{node.lineno}")
     assert {name: places for name, places in homes.items() if len(places) > 1} == {}
+
+
+def test_a_public_name_is_that_of_one_object() -> None:
+    """What is imported as another name is not hidden behind it."""
+    names: list[str] = []
+    for node in ast.parse((ROOT / "softflagella" / "__init__.pyi").read_text()).body:
+        if isinstance(node, ast.ImportFrom):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.Assign):
+            names += [target.id for target in node.targets if isinstance(target, ast.Name)]
+    assert len(names) > 50
+    assert len(names) == len(set(names))

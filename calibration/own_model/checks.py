@@ -9,22 +9,16 @@ import numpy as np
 from calibration.linear.gls import repeat_count
 from calibration.own_model.function_model import NOT_ABOVE_0, FunctionModel, evaluate
 from calibration.statistics.statistical_model import Parameter, start_values
-from calibration.table.checks import refuse_equal_repeats
+from calibration.table.between_repeats import refuse_equal_repeats
 from calibration.table.runs import FEWEST_REPEATS
+from calibration.table.unit_slips import refuse_other_units
 from common.arrays import Flags, Floats
 from common.errors import InputError
 
 _FEWEST = 4  # rows, some of which are held out
-_FAR = 100.0  # factor between what was measured and the model with its start values
-_OTHER_UNITS = (  # factor, units of an output in which it is a mistake, what the table then has
-    (100.0, ("1", "%"), "per cent"),
-    (180 / np.pi, ("1", "rad", "deg", "°"), "degrees"),
-)
 _SMALL = 1e-3  # change of a parameter, in its typical size
 _ROUGHLY = 0.2  # share by which large changes differ that may be in proportion
 _NEXT = 0.01  # change of a number, in its typical size, with which a fit begins
-_NEAR = 1.3  # factor between another unit and what is found
-_TOGETHER = 0.9  # least correlation, about 0, of what is compared as a difference
 
 
 def check_function(model: FunctionModel, *, title: str = "") -> tuple[str, ...]:
@@ -68,22 +62,8 @@ def check_function(model: FunctionModel, *, title: str = "") -> tuple[str, ...]:
                 f"{number.name} and {second.name} cannot be told apart: they change the outputs in proportion, as "
                 "in a product; leave one of them out of numbers=[…], or give it a sigma"
             )
-    for place, (name, output) in enumerate(model.model.outputs.items()):
-        measured, predicted = runs.y[:, place], given[:, place]
-        ratio = output.kind == "ratio"
-        factor = float(np.exp(np.median(measured - predicted))) if ratio else _slope(measured, predicted)
-        for other, units, words in _OTHER_UNITS:
-            if output.unit in units and 1 / _NEAR < factor / other < _NEAR:
-                raise InputError(
-                    f"{name} is {factor:.3g} times what the model gives: the table seems to have {words}; convert "
-                    "the column or what the function returns, or give other start values"
-                )
-        if ratio and not 1 / _FAR < factor < _FAR:
-            raise InputError(
-                f"{name} is {factor:.3g} times what the model gives with its start values "
-                f"({', '.join(f'{n.name} = {n.start:g}' for n in model.model.numbers)}): check the units of both, "
-                f"and give start values that come within a factor of {_FAR:g}"
-            )
+    starts = ", ".join(f"{n.name} = {n.start:g}" for n in model.model.numbers)
+    refuse_other_units(runs, given, model.model.outputs, starts)
     return tuple(f"these runs cannot tell {effect.words} from {number.words}" for number, effect in alike)
 
 
@@ -100,15 +80,12 @@ def _inseparable(model: FunctionModel, changes: dict[str, Floats]) -> list[tuple
     They do so at the start and elsewhere; `changes` are those of larger steps, which tell what need not be tried.
     """
     start, free = start_values(model), model.coefficients
-    elsewhere = {**start, **{p.name: _changed(p) for p in free}}
-    pairs = [*combinations(free, 2), *product(free, model.effects)]
+    points = start, {**start, **{p.name: _changed(p) for p in free}}
     return [
         (p, q)
-        for p, q in pairs
+        for p, q in (*combinations(free, 2), *product(free, model.effects))
         if _in_proportion(changes[p.name], changes[q.name], _ROUGHLY)
-        and all(
-            _in_proportion(_slope_along(model, at, p), _slope_along(model, at, q)) for at in (start, elsewhere)
-        )
+        and all(_in_proportion(_slope_along(model, at, p), _slope_along(model, at, q)) for at in points)
     ]
 
 
@@ -120,10 +97,7 @@ def _slope_along(model: FunctionModel, at: dict[str, float], of: Parameter) -> F
 
 def _in_proportion(one: Floats, other: Floats, within: float = 1e-5) -> bool:
     """Say whether two changes of a prediction are in proportion."""
-    slopes = np.stack([one.ravel(), other.ravel()], 1)
-    lengths = np.sqrt((slopes**2).sum(0))
-    known = bool(np.isfinite(slopes).all() and lengths.all())
-    return known and bool(np.linalg.svd(slopes / lengths, compute_uv=False)[1] < within)
+    return bool(abs((one * other).sum()) > (1 - within**2) * np.linalg.norm(one) * np.linalg.norm(other))
 
 
 def _solved_near(model: FunctionModel, parameter: Parameter, start: dict[str, float]) -> bool:
@@ -154,10 +128,3 @@ def _check_values(model: FunctionModel, given: Floats, changed: list[Floats]) ->
 
 def _unusable(prediction: Floats) -> Flags:
     return ~np.isfinite(prediction) | (prediction == NOT_ABOVE_0)
-
-
-def _slope(measured: Floats, predicted: Floats) -> float:
-    """Return how much measured values rise with predicted ones; 1 where they do not go together."""
-    square = float(predicted @ predicted)
-    alike = abs(float(measured @ predicted)) > _TOGETHER * np.sqrt(square * float(measured @ measured))
-    return float(measured @ predicted) / square if square and alike else 1.0

@@ -4,93 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field, fields, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import partial
-from numbers import Real
-from typing import Any, Literal, Self
+from typing import Any
 
 from calibration.statistics.checks import names_once
 from calibration.statistics.statistical_model import Parameter
+from calibration.table.declared import Declared, Output, refuse_no_deviation
 from common.errors import InputError
-from common.units import find_unit, from_si, parse_sigma, split
+from common.units import find_unit, parse_sigma, split
 
 Function = Callable[[Mapping[str, Any], Mapping[str, float]], Mapping[str, Any]]  # columns, parameters -> outputs
 _WIDE = 1000.0  # factor to the ends of the range of a number for which none is given
 
 
-class _Declared:
-    """What is declared: a unit and what follows it have their keywords."""
-
-    unit: str
-
-    def __new__(cls, *given: object, **_: object) -> Self:
-        """Refuse what is given by its place alone where it needs its keyword."""
-        first = [each.name for each in fields(cls) if not each.kw_only]  # type: ignore[arg-type]
-        if len(given) > len(first):
-            raise InputError(
-                f"sf.{_public(cls)}({', '.join(first)}, …): the further value {given[len(first)]!r} needs its "
-                f"keyword, as in unit={given[len(first)]!r}"
-            )
-        return super().__new__(cls)
-
-    def _tidy(self, of: str, numbers: Sequence[str] = (), *, needed: Sequence[str] = ()) -> None:
-        """Refuse a unit that is no text, and numbers that are none; without a unit it is 1."""
-        if not isinstance(self.unit, str):
-            raise InputError(f'{of}: unit {self.unit!r}; give a text such as "m/s", or leave it out')
-        object.__setattr__(self, "unit", self.unit.strip() or "1")
-        for name in (*needed, *numbers):
-            value = getattr(self, name)
-            if not (isinstance(value, Real) or (value is None and name not in needed)):
-                raise InputError(f"{of}: {name} {value!r}; give a number")
-
-
-def _public(kind: type) -> str:
-    return kind.__name__.removeprefix("Model")
-
-
 @dataclass(frozen=True)
-class Output(_Declared):
-    """What was measured, in a column of the same name.
-
-    Example:
-        >>> import softflagella as sf
-        >>> sf.Output("speed", unit="m/s").kind
-        'ratio'
-    """
-
-    title: str  # in words
-    _: KW_ONLY
-    unit: str = "1"
-    kind: Literal["ratio", "difference"] = "ratio"  # "difference" for angles and for values that change sign
-    # Standard deviation of one run, if it is known: a text like "2 %" for a ratio; for a difference, in its unit.
-    sigma: float | str | None = None
-    unit_checked: bool = False  # a session that reads 10, 60, … times as much as others is right
-
-    def __post_init__(self) -> None:
-        if self.kind not in ("ratio", "difference"):
-            raise InputError(f"output {self.title!r}: kind {self.kind!r}; give 'ratio' or 'difference'")
-        self._tidy(f"output {self.title!r}")
-        if self.sigma is not None:
-            self.deviation(self.sigma, f"output {self.title!r}: sigma")
-
-    @property
-    def turn(self) -> float:
-        """A whole turn in the unit of an angle whose differences are compared; 0 for all else."""
-        unit = find_unit(self.unit) if self.kind == "difference" else None
-        return float(from_si(math.tau, unit.suffix)) if unit and unit.kind == "angle" else 0.0
-
-    def deviation(self, sigma: float | str, entry: str) -> float:
-        """Read a standard deviation of one run, relative for a ratio; `entry` names its place."""
-        size, relative = parse_sigma(sigma, entry)
-        if relative != (self.kind == "ratio"):
-            meant = f"a number in {self.unit}" if relative else 'a share, such as "2 %"'
-            raise InputError(f"{entry} {sigma!r}: this output is compared as a {self.kind}; give {meant}")
-        _refuse_no_deviation(entry, size)
-        return size
-
-
-@dataclass(frozen=True)
-class Number(_Declared):
+class Number(Declared):
     """A number of the model, which is fitted; on a logarithmic scale if it is positive.
 
     Example:
@@ -109,12 +38,12 @@ class Number(_Declared):
     sigma: float | str | None = None  # of a number known to a tolerance: in its unit, or "1 %" of the start
 
     def __post_init__(self) -> None:
-        self._tidy(self.name, ("low", "high"), needed=("start",))
+        self._tidy(self.name)
         bounds = self._bounds
         _refuse_outside(self.name, "start", self.start, bounds)
         if (sigma := self._deviation) is None:
             return
-        _refuse_no_deviation(f"{self.name}: sigma", sigma)
+        refuse_no_deviation(f"{self.name}: sigma", sigma)
         if bounds[0] > 0 and sigma > self.start:
             raise InputError(
                 f"{self.name}: sigma {self.sigma!r} is more than the number itself, {self.start:g}; give it in "
@@ -147,8 +76,8 @@ class Number(_Declared):
 
 
 @dataclass(frozen=True)
-class ModelEffect(_Declared):
-    """What a model may lack, `sf.Effect`; at its null the function is the model without it.
+class Effect(Declared):
+    """What a model may lack; at its null the function is the model without it.
 
     Example:
         >>> import softflagella as sf
@@ -168,7 +97,7 @@ class ModelEffect(_Declared):
     plausible: tuple[float, float] | None = None  # sizes that its source allows; default: all
 
     def __post_init__(self) -> None:
-        self._tidy(self.name, ("typical", "theory"), needed=("low", "high", "null"))
+        self._tidy(self.name)
         for what in ("null", "theory"):
             if (value := getattr(self, what)) is not None:
                 _refuse_outside(self.name, what, value, (self.low, self.high))
@@ -209,7 +138,7 @@ class Model:
     function: Function
     outputs: Mapping[str, Output]  # by their columns
     numbers: Sequence[Number]
-    effects: Sequence[ModelEffect] = field(default=())
+    effects: Sequence[Effect] = field(default=())
     settings: Sequence[str] | None = None  # columns that repeats share; default: all for which the function asks
     # In which the function asks for columns, {"length": "m"}; the table may have length_cm.
     units: Mapping[str, str] = field(default_factory=dict)
@@ -219,12 +148,12 @@ class Model:
             known = find_unit(unit)
             if known is None or split(name).unit not in (None, known):
                 raise InputError(f"units: {name!r} in {unit!r}; give a unit that is known, such as m, deg or Pa s")
-        for what, kind in (("outputs", Output), ("numbers", Number), ("effects", ModelEffect)):
+        for what, kind in (("outputs", Output), ("numbers", Number), ("effects", Effect)):
             given = getattr(self, what)
             each = list(given.values() if what == "outputs" and isinstance(given, Mapping) else given)
             if not all(isinstance(one, kind) for one in each) or not (each or what == "effects"):
                 raise InputError(
-                    f"{what} of a model are each an sf.{_public(kind)}, one at least; given: {given!r}"
+                    f"{what} of a model are each an sf.{kind.__name__}, one at least; given: {given!r}"
                 )
         names_once(parameter.name for parameter in self.parameters)
 
@@ -252,8 +181,3 @@ def _refuse_outside(name: str, what: str, value: float, bounds: tuple[float, flo
     low, high = bounds
     if not (low < high and low <= value <= high and math.isfinite(value)):
         raise InputError(f"{name}: {what} {value:g} with low {low:g} and high {high:g}; give low ≤ {what} ≤ high")
-
-
-def _refuse_no_deviation(entry: str, sigma: float) -> None:
-    if not 0 < sigma < math.inf:
-        raise InputError(f"{entry} {sigma:g}; give a standard deviation above 0, or none")

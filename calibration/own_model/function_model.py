@@ -15,6 +15,7 @@ from calibration.own_model.declared import Model
 from calibration.statistics.budget import count_predictions, spent, waiting
 from calibration.statistics.forward import secants
 from calibration.statistics.statistical_model import Parameter, Parameters, Predict
+from calibration.table.reader import within_half_a_turn
 from calibration.table.runs import Runs
 from common.arrays import Flags, Floats, Integers
 from common.errors import InputError
@@ -52,7 +53,6 @@ class TableRuns(Runs):
     """Runs of a table of any columns; what was set is their inputs."""
 
     words: frozenset[str] = field(default=frozenset(), kw_only=True)  # inputs that number words
-    converted: tuple[str, ...] = field(default=(), kw_only=True)  # columns in other units, in words
 
     @property
     def settings(self) -> dict[str, tuple[Floats, str]]:
@@ -172,11 +172,6 @@ class FunctionModel:
         values = {name: table[name].to_numpy().astype(old.dtype) for name, old in self.columns.items()}
         settings = [{name: values[name][row].item() for name in names} for row in range(len(runs))]
         return replace(self, runs=runs, columns=AskedColumns(values, self.columns.asked), known={}), settings
-
-
-def within_half_a_turn(values: Any, about: Any, turns: Any) -> Any:
-    """Change angles by whole turns, of size `turns`, to within half a turn of others; where that is 0, nothing."""
-    return values + turns * np.round((about - values) / np.where(turns, turns, 1.0))
 
 
 def evaluate(model: Model, columns: AskedColumns, parameters: Mapping[str, Any]) -> Floats:

@@ -10,7 +10,7 @@ import re
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal, NamedTuple, cast
+from typing import Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -18,21 +18,15 @@ import pandas as pd
 from calibration.linear.gls import repeat_count
 from calibration.own_model.checks import check_function
 from calibration.own_model.declared import Model
-from calibration.own_model.function_model import (
-    AskedColumns,
-    FunctionModel,
-    TableRuns,
-    evaluate,
-    within_half_a_turn,
-)
+from calibration.own_model.function_model import AskedColumns, FunctionModel, TableRuns, evaluate
 from calibration.statistics.study import middle_session
-from calibration.table.excluded import MANY, Faults
-from calibration.table.gaps import filled, gaps_in_words, is_missing, with_outputs, without_gaps
+from calibration.table.excluded import MANY
+from calibration.table.reader import Declaration, TableReader, as_numbers, is_missing, open_table, require
 from calibration.table.runs import FEWEST_REPEATS
 from common.arrays import Flags, Floats, Integers, Words
 from common.errors import InputError, naming
-from common.quantities import convert_columns, numbers_of
-from common.tables import LINE, read_table, row_name
+from common.quantities import convert_columns
+from common.tables import row_name
 from common.units import find_unit, split
 
 Noise = Mapping[str, float | str] | Literal["unknown"]
@@ -66,12 +60,9 @@ def read_runs_of(
         InputError: the table lacks a column, or the model or what was measured has a fault.
     """
     with naming(source):
-        table = (source if isinstance(source, pd.DataFrame) else read_table(source)).rename(columns=str)
-        if table.columns.has_duplicates:
-            raise InputError(f"the table has a column {table.columns[table.columns.duplicated()][0]!r} twice")
-        result = _read(
-            table, model, roles._replace(session=roles.session or ("session" in table and "session") or None)
-        )
+        table = open_table(source)
+        session = roles.session or ("session" if "session" in table else None)
+        result = _read(table, model, roles._replace(session=session))
         caveats = check_function(result, title=title)
         held_out = _held_out(roles.held_out, result)
         if held_out is None and not middle_session(result.runs).any():
@@ -98,90 +89,45 @@ def _in_its_units(table: pd.DataFrame, model: Model) -> tuple[pd.DataFrame, tupl
     return table, tuple(told)
 
 
-def _read(table: pd.DataFrame, model: Model, roles: Roles) -> FunctionModel:
-    table, converted = _in_its_units(table, model)
-    own = [name for name in (roles.session, roles.specimen) if name]
-    for name in (*model.outputs, *(model.settings or ()), *own, *_names(roles.notes)):
-        if not isinstance(name, str) or name not in table:
-            raise InputError(f"the table has no column {name!r}; it has {', '.join(table.columns)}")
-    outputs = table[list(model.outputs)].apply(numbers_of)
-    columns = AskedColumns({name: _values(table[name]) for name in table.columns if name not in outputs})
-    faults = _faults_of_outputs(table, outputs, model)
-    settings = _settings(model, columns, faults)
-    needed = list(dict.fromkeys([*columns.asked, *settings, *own]))
-    _add_missing(faults, columns, needed)
-    specimens = own[-1:] if roles.specimen else []
-    was_set = np.column_stack([_as_numbers(columns[name]) for name in (*specimens, *settings)])
-    faults.add_copies(was_set, outputs.to_numpy())
-    if not (keep := faults.usable).any():
-        raise InputError(f"the table has no usable row: {faults[0]}")
-    columns, was_set, good, missing = columns.rows(keep), was_set[keep], outputs[keep], table[list(outputs)].isna()
-    condition = np.unique(was_set, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
-    if len(condition) * (distinct := int(condition.max()) + 1) > _MOST:
+def _read(original: pd.DataFrame, model: Model, roles: Roles) -> FunctionModel:
+    table, converted = _in_its_units(original, model)
+    require(table, _names(roles.notes))
+    own = [name for name in (roles.specimen, roles.session) if name]
+    same = {name: (name, 1.0) for name in model.outputs}
+    required = [*(model.settings or ()), *own]
+    declared = Declaration(model.outputs, same, required, roles.session, roles.specimen)
+    reader = TableReader(table, declared, original)
+    _set_aside_low(reader)
+    columns = AskedColumns(reader.columns)
+    settings = _settings(model, columns, reader)
+    needed = [*columns.asked, *settings, *own]
+    reader.set_aside_lacking(needed)
+    known = reader.runs([name for name in (roles.specimen, *settings) if name])
+    if (count := len(known["rows"])) * (distinct := int(known["condition"].max()) + 1) > _MOST:
         raise InputError(
-            f"{distinct} settings in {len(condition)} rows are more than can be tested; name what repeats share "
-            "in settings=[…] of the model, round it, or give fewer rows"
+            f"{distinct} settings in {count} rows are more than can be tested; name what repeats share in "
+            "settings=[…] of the model, round it, or give fewer rows"
         )
-    inputs, words = {}, []
-    for name, values in zip(settings, was_set[:, len(specimens) :].T, strict=True):
+    rows = known["rows"] - 1
+    columns, good = columns.rows(rows), reader.measured.iloc[rows]
+    inputs = {}
+    for name in settings:
+        values = as_numbers(columns[name])
         logarithmic = columns[name].dtype.kind == "f" and bool((values > 0).all())
         inputs[f"ln {name}" if logarithmic else name] = np.log(values) if logarithmic else values
-        words += [name] if columns[name].dtype.kind != "f" else []
-    session, session_names = _levels(roles.session, columns)
-    specimen, specimen_names = _levels(roles.specimen, columns)
-    kinds = model.outputs.items()
-    compared = {name: np.log(good[name]) if o.kind == "ratio" else good[name] for name, o in kinds}
-    for name, output in kinds:
-        if output.turn:
-            compared[name] = _about_their_mean(compared[name], condition, output.turn)
     runs = TableRuns(
-        outputs=tuple(model.outputs),
-        y=filled(pd.DataFrame(compared), condition),
-        condition=condition,
-        session=session,
-        session_names=session_names,
+        **known,
         inputs=np.column_stack(list(inputs.values())),
         input_names=tuple(inputs),
-        rows=np.flatnonzero(keep) + 1,
-        excluded=(*faults.in_order, *gaps_in_words(table, missing & keep[:, None])),
         caveats=(),
-        completion=without_gaps(missing.to_numpy()[keep]),
-        specimen=specimen if roles.specimen else None,
-        specimen_names=specimen_names if roles.specimen else (),
         sigma=_sigma(model, roles.noise),
         noise_known=roles.noise != "unknown",
-        notes=_notes(columns, [*needed, *_names(roles.held_out)], roles.notes, good, condition),
-        output_titles={name: o.title or name for name, o in kinds},
-        output_scales={name: (1.0, o.unit.removeprefix("1")) for name, o in kinds if o.kind == "difference"},
-        unit_checked={name: o.unit_checked for name, o in kinds},
-        lines=table.index.to_numpy()[keep] if table.index.name == LINE else None,
-        words=frozenset(words),
+        notes=_notes(columns, [*needed, *_names(roles.held_out)], roles.notes, good, known["condition"]),
+        unit_checked={name: output.unit_checked for name, output in model.outputs.items()},
+        words=frozenset(name for name in settings if columns[name].dtype.kind != "f"),
         converted=converted,
     )
-    return FunctionModel(model, with_outputs(runs, range(len(runs.outputs))), columns)
-
-
-def _about_their_mean(angles: pd.Series, condition: Integers, turn: float) -> pd.Series:
-    """Change angles by whole turns, so that repeats are within half a turn of their circular mean."""
-    first = angles.groupby(condition).transform("first")
-    around = (angles - first) * (2 * np.pi / turn)
-    sine, cosine = (part.groupby(condition).transform("mean") for part in (np.sin(around), np.cos(around)))
-    mean = first + np.arctan2(sine, cosine) * (turn / (2 * np.pi))
-    return cast(pd.Series, within_half_a_turn(angles, mean, turn))
-
-
-def _values(column: pd.Series) -> Floats | Words:
-    """Return a column as numbers, NaN for what is none; if most values are words as words, "" for a gap."""
-    numbers, given = numbers_of(column).to_numpy(dtype=float), column.notna().to_numpy()
-    if np.isfinite(numbers).sum() * 2 < given.sum():
-        return np.where(given, column.astype(str).str.strip(), "").astype(str)
-    return numbers
-
-
-def _as_numbers(values: Floats | Words) -> Floats:
-    """Return a column as numbers, those of its words where it has words."""
-    numbers = values if values.dtype.kind == "f" else np.unique(values, return_inverse=True)[1]
-    return np.asarray(numbers, dtype=float)
+    return FunctionModel(model, runs.with_outputs(range(len(runs.outputs))), columns)
 
 
 def _advice(model: FunctionModel, roles: Roles) -> list[str]:
@@ -204,39 +150,24 @@ def _advice(model: FunctionModel, roles: Roles) -> list[str]:
     return advice
 
 
-def _levels(name: str | None, columns: AskedColumns) -> tuple[Integers, tuple[str, ...]]:
-    """Number the distinct values of a column, (n,), and name each; a number goes with the name of the column."""
-    if name is None:
-        return np.zeros(len(next(iter(columns.values()))), dtype=np.int64), ("all runs",)
-    distinct, number = np.unique(columns[name], return_inverse=True)
-    names = [f"{name} {value:g}" if distinct.dtype.kind == "f" else str(value) for value in distinct]
-    return number.reshape(-1).astype(np.int64), tuple(names)
-
-
-def _faults_of_outputs(table: pd.DataFrame, outputs: pd.DataFrame, model: Model) -> Faults:
-    """Say of which rows the outputs cannot be used; refuse ratios of which many are not above 0."""
-    missing, faults = table[list(outputs)].isna(), Faults(table)
-    faults.add(missing.all(axis=1), "no output has a value")
-    for name, output in model.outputs.items():
-        faults.add_not_finite(name, ~np.isfinite(outputs[name]) & ~missing[name])
-        low = (outputs[name] <= 0) & (output.kind == "ratio")
-        if low.mean() > MANY:
-            first = row_name(table, int(np.argmax(low)))
+def _set_aside_low(reader: TableReader) -> None:
+    """Set aside rows with a ratio that is not above 0; refuse a table with many of them."""
+    for name in (name for name, output in reader.declared.outputs.items() if output.kind == "ratio"):
+        if (low := reader.measured[name] <= 0).mean() > MANY:
+            first = row_name(reader.table, int(np.argmax(low)))
             raise InputError(
-                f"{name} is not above 0 in {low.sum()} of {len(table)} rows, first in {first}, "
-                "and cannot be compared as a ratio; declare its Output with kind='difference'"
+                f"{name} is not above 0 in {low.sum()} of {len(low)} rows, first in {first}, and cannot be "
+                "compared as a ratio; declare its Output with kind='difference'"
             )
-        faults.add(low, f"{name}{{}} is not above 0", [f"{value:g}" for value in outputs[name]])
-    return faults
+        reader.set_aside(low, f"{name}{{}} is not above 0", [f"{value:g}" for value in reader.measured[name]])
 
 
-def _settings(model: Model, columns: AskedColumns, faults: Faults) -> list[str]:
+def _settings(model: Model, columns: AskedColumns, reader: TableReader) -> list[str]:
     """Return the settings; default: the columns for which the function asks, found from rows that have them."""
     before = -1
     while before < (before := len(columns.asked)):
-        _add_missing(faults, columns, columns.asked)
-        if not (usable := faults.usable).any():
-            raise InputError(f"the table has no usable row: {faults.get(0, 'it is empty')}")
+        reader.set_aside_lacking(columns.asked)
+        usable = reader.usable
         try:
             evaluate(model, columns.rows(usable), {p.name: p.start for p in model.parameters})
         except InputError:
@@ -245,12 +176,6 @@ def _settings(model: Model, columns: AskedColumns, faults: Faults) -> list[str]:
     if model.settings or columns.asked:
         return list(model.settings or columns.asked)
     raise InputError("the function asks for no column; name the model's settings, columns that repeats share")
-
-
-def _add_missing(faults: Faults, columns: AskedColumns, names: Iterable[str]) -> None:
-    """Add every row that lacks a value of a column."""
-    for name in names:
-        faults.add_not_finite(name, is_missing(columns[name]))
 
 
 def _notes(

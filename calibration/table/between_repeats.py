@@ -30,10 +30,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.special import fdtrc, ndtri
 
-from calibration.linear.gls import repeat_count
-from calibration.table.gaps import is_missing
+from calibration.linear.gls import repeat_count, repeat_covariance
+from calibration.table.reader import is_missing
 from calibration.table.runs import FEWEST_REPEATS, Runs
 from common.arrays import Flags, Floats, Integers
+from common.errors import InputError
 
 SHARE_OF_LEVEL = 0.25  # of the level of a claim: 1 % beside the 4 % of all tests with the model
 ORDER = "order of the runs"
@@ -45,6 +46,7 @@ _FREE = 0.05  # share of what a note differs by within sessions that M must leav
 _FEWEST = 5  # degrees of freedom of what is left
 _FAR, _MAD = 4.0, 1.4826  # residuals are clipped at so many robust standard deviations
 _NONE, _TINY = 1e-9, 1e-300
+_EQUAL = 1e-24  # variance of repeats that are equal, over the mean square
 
 
 class NoteColumn(NamedTuple):
@@ -77,6 +79,16 @@ class _Test(NamedTuple):
     column: NoteColumn
     p: float  # of an F-distribution
     null: Floats  # (D,) the same of the draws
+
+
+def refuse_equal_repeats(runs: Runs, repeated: Integers | Floats, columns: Sequence[str]) -> None:
+    """Refuse an output that is the same in all repeats, from which its noise cannot be estimated."""
+    variances = np.diag(repeat_covariance(runs.y, repeated))
+    for place in np.flatnonzero(variances <= _EQUAL * np.mean(runs.y**2, 0))[:1].tolist():
+        raise InputError(
+            f"{columns[place]} is the same in all repeats; drop copies of rows, give unrounded values, or leave "
+            "it out"
+        )
 
 
 def usable(values: Any) -> bool:

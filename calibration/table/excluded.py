@@ -25,13 +25,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
+from calibration.linear.gls import repeat_count, repeat_covariance
 from common.arrays import Flags, Floats, Integers
-from common.tables import row_name
 
 COPY = "a copy of an earlier row, equal in all inputs and outputs{}"
 _MANY_ROWS, _DISTANCES = 10, 5  # distinct rows; distances that are tried
@@ -51,50 +51,6 @@ class Excluded(NamedTuple):
     def __str__(self) -> str:
         words = self.reason.replace("{}", self.value)
         return f"{self.row}: {words}" if self.row else words
-
-
-class Faults(dict[int, Excluded]):
-    """Rows of a table that cannot be used, by their place, from 0; the first fault of a row counts."""
-
-    def __init__(self, table: pd.DataFrame):
-        super().__init__()
-        self.table = table
-
-    def add(self, bad: Any, reason: str, values: Any = ()) -> None:
-        """Add the rows where `bad` (n,), with their values (n,) if these are told."""
-        for row in np.flatnonzero(bad).tolist():
-            value = f" = {values[row]}" if len(values) else ""
-            self.setdefault(row, Excluded(reason, row_name(self.table, row), value))
-
-    def add_not_finite(self, column: str, bad: Any) -> None:
-        """Add the rows where `bad` (n,): their value of a column is missing, or no number."""
-        missing = self.table[column].isna()
-        self.add(bad & missing, f"{column} has no value")
-        self.add(bad & ~missing, f"{column}{{}} is not a finite number", self.table[column].tolist())
-
-    def add_copies(self, inputs: Floats, outputs: Floats) -> None:
-        """Add the usable rows with all outputs (n, k) that are copies of an earlier one."""
-        whole = np.flatnonzero(self.usable & np.isfinite(outputs).all(axis=1))
-        rows = self.table.iloc[whole].astype(str)
-        number = rows.groupby([*rows], sort=False, dropna=False).ngroup()
-        copies = pasted(number.to_numpy().astype(np.int64), inputs[whole])
-        kept = ~np.isin(np.arange(len(whole)), list(copies))
-        places = np.flatnonzero(kept).tolist()
-        again = find_copies(inputs[whole][kept], outputs[whole][kept])
-        copies |= {places[place]: places[earlier] for place, earlier in again.items()}
-        for place, earlier in copies.items():
-            name, original = (row_name(self.table, int(whole[at])) for at in (place, earlier))
-            self[int(whole[place])] = Excluded(COPY, name, f" ({original})")
-
-    @property
-    def usable(self) -> Flags:
-        """The rows without a fault, (n,)."""
-        return ~np.isin(np.arange(len(self.table)), list(self))
-
-    @property
-    def in_order(self) -> list[Excluded]:
-        """The faults by their rows."""
-        return [self[row] for row in sorted(self)]
 
 
 def summary_of_excluded(excluded: Sequence[Excluded], total: int) -> list[str]:
@@ -138,59 +94,50 @@ def caveat_of_excluded(excluded: Sequence[Excluded], total: int) -> tuple[str, .
 
 def pasted(number: Integers, inputs: Floats) -> dict[int, int]:
     """Find rows that were pasted whole, by the numbers (n,) of distinct ones: place -> place of the first one."""
-    counts = np.bincount(number)
+    counts, copied = np.bincount(number), np.zeros(len(number), dtype=bool)
     times = int(np.gcd.reduce(counts, initial=0))
-    first = np.full(len(counts), len(number))
-    np.minimum.at(first, number, np.arange(len(number)))
     if times > 1 and len(counts) >= _MANY_ROWS:
         nth = pd.Series(number).groupby(number).cumcount().to_numpy()
-        return {
-            place: int(first[number[place]]) for place in np.flatnonzero(nth >= counts[number] // times).tolist()
-        }
+        return _with_first(number, nth >= counts[number] // times)
     before = pd.Series(np.arange(len(number))).groupby(number).diff().dropna().astype(int)
-    copies: dict[int, int] = {}
     for distance in before.value_counts().index[:_DISTANCES].tolist():
         same = number[distance:] == number[:-distance]
-        settings = (inputs[distance:] == inputs[:-distance]).all(axis=1)
-        ends = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int)))
-        for start, end in ends.reshape(-1, 2).tolist():
-            others = settings.sum() - (end - start)
-            agree = same.sum() - (end - start)
-            if settings.sum() * 0.5 ** (end - start) < _CHANCE and 2 * agree <= others:
-                copies |= {place + distance: int(first[number[place]]) for place in range(start, end)}
-    return copies
+        alike, settings = same.sum(), (inputs[distance:] == inputs[:-distance]).all(axis=1).sum()
+        blocks = np.flatnonzero(np.diff(same, prepend=False, append=False)).reshape(-1, 2)
+        for start, end in blocks.tolist():
+            long = end - start
+            if settings * 0.5**long < _CHANCE and 2 * (alike - long) <= settings - long:
+                copied[start + distance : end + distance] = True
+    return _with_first(number, copied)
+
+
+def _with_first(number: Integers, copied: Flags) -> dict[int, int]:
+    """Return the places of copied rows (n,), and of the first row that has the number of each."""
+    first = np.unique(number, return_index=True)[1][number]
+    return {place: int(first[place]) for place in np.flatnonzero(copied).tolist()}
 
 
 def find_copies(inputs: Floats, outputs: Floats) -> dict[int, int]:
     """Find copied rows of inputs (n, q) and outputs (n, k): place -> place of the row that it repeats."""
-    first: dict[tuple[float, ...], int] = {}
-    copies = {}
-    for place, row in enumerate(np.column_stack([inputs, outputs]).tolist()):
-        earlier = first.setdefault(tuple(row), place)
-        if earlier != place:
-            copies[place] = earlier
-    if not copies:
+    number = np.unique(np.column_stack([inputs, outputs]), axis=0, return_inverse=True)[1].reshape(-1)
+    copied = pd.Series(number).duplicated().to_numpy()
+    if not copied.any():
         return {}
     condition = np.unique(inputs, axis=0, return_inverse=True)[1].reshape(-1)
     sizes = np.bincount(condition)
     pairs = float((sizes * (sizes - 1) / 2).sum())
-    kept = np.ones(len(inputs), dtype=bool)
-    kept[list(copies)] = False
-    chance = math.prod(_equal(outputs[kept, i], condition[kept].tolist()) for i in range(outputs.shape[1]))
-    return copies if pairs * chance < _CHANCE else {}
+    chance = math.prod(_equal(values, condition[~copied]) for values in outputs[~copied].T)
+    return _with_first(number, copied) if pairs * chance < _CHANCE else {}
 
 
-def _equal(values: Floats, condition: Sequence[int]) -> float:
+def _equal(values: Floats, condition: Integers) -> float:
     """Estimate the probability that two repeats of an output (n,) are equal."""
     distinct = np.unique(values)
     gaps = np.diff(distinct)
     gaps = gaps[gaps > _ROUNDING * np.abs(distinct[1:])]
     if not len(gaps):
         return 1.0
-    groups: dict[int, list[float]] = {}
-    for place, value in zip(condition, values.tolist(), strict=True):
-        groups.setdefault(place, []).append(value)
-    square = sum(((np.array(group) - np.mean(group)) ** 2).sum() for group in groups.values())
-    repeats = len(values) - len(groups)
-    scatter = math.sqrt(square / repeats) if repeats else _TYPICAL * float(np.median(np.abs(values)))
+    scatter = _TYPICAL * float(np.median(np.abs(values)))
+    if repeat_count(condition):
+        scatter = math.sqrt(repeat_covariance(values[:, None], condition)[0, 0])
     return min(1.0, float(gaps.min()) / (2 * math.sqrt(math.pi) * scatter)) if scatter else 1.0

@@ -1,8 +1,5 @@
 """The runs of a table, ready to be compared: with each other, and with a model.
 
-**Repeats.** What differs between runs under one condition is the noise of a run (`calibration.linear.gls`). Where
-repeats also differ by session, or by what was noted, a design says what is the same in them.
-
 **Gaps.** A run may lack some of its outputs. Let T put S_mo S_oo⁻¹ r_o for what is missing (m) of a residual r,
 from what was measured (o) of the same run. Then (T r)ᵀ S⁻¹ (T r) = r_oᵀ S_oo⁻¹ r_o: where T acts on residuals,
 derivatives and drawn noise alike, least squares are those of the measured values alone, and nothing is filled in.
@@ -13,9 +10,9 @@ its runs were whole.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from scipy.special import fdtrc
@@ -46,6 +43,7 @@ class Runs:
     excluded: tuple[Excluded, ...]  # rows and columns of the table
     caveats: tuple[str, ...]  # what these runs cannot show, in words
     _: KW_ONLY
+    converted: tuple[str, ...] = ()  # columns that were renamed, converted, or are tested as groupings, in words
     weight: Floats | None = None  # (n,) variance of a run is S over it; None: 1
     completion: Floats | None = None  # T, (n, k, k); None: no gaps. y is arbitrary there
     sigma: Floats | None = None  # (k,) declared standard deviation of a run
@@ -215,11 +213,27 @@ class Runs:
         """What is 1 for true columns, in words -> its logarithm in each run, (n,); NaN where it is unknown."""
         return {}
 
+    def with_outputs(self, kept: Sequence[int]) -> Self:
+        """Keep some outputs, and let those of a run stand for the one that it lacks (`completion`)."""
+        gaps = self.gaps[:, kept]
+        names, completion = tuple(self.outputs[i] for i in kept), without_gaps(gaps)
+        runs = replace(self, outputs=names, y=self.y[:, kept], completion=completion if gaps.any() else None)
+        if gaps.any() and repeat_count(runs.repeats()) >= FEWEST_REPEATS:
+            run = repeat_covariance(runs.y, runs.repeats())
+            for T, gap in zip(completion, gaps, strict=True):
+                T[np.ix_(gap, ~gap)] = np.linalg.solve(run[np.ix_(~gap, ~gap)], run[np.ix_(~gap, gap)]).T
+        return runs
+
     def subset(self, rows: Flags | Integers) -> Any:
         """Choose the runs in `rows`: flags (n,), or places."""
         of_runs = {k: v for k, v in vars(self).items() if isinstance(v, np.ndarray) and k != "sigma"}
         arrays: dict[str, Any] = {k: v[rows] for k, v in of_runs.items()}
         return replace(self, **arrays, notes={name: values[rows] for name, values in self.notes.items()})
+
+
+def without_gaps(gaps: Flags) -> Floats:
+    """Make `Runs.completion` of gaps (n, k) for which nothing stands."""
+    return np.eye(gaps.shape[1]) * ~gaps[:, :, None]
 
 
 def lines_of_excluded(runs: Runs) -> list[str]:

@@ -14,35 +14,34 @@ a slip where
 - it is that between the units, to three standard deviations of a session, which scatters as a single run does
   (`calibration.linear.gls`), but not beyond `_NEAR`;
 - no other output of the session has the same factor or its inverse, as a robot that moves ten times as fast would.
+
+A factor of all runs against the model as given is no slip of a session: then the unit of the column is wrong, or
+that of what the model returns.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
+from calibration.table.declared import Output
 from calibration.table.runs import Runs
 from common.arrays import Flags, Floats
 from common.errors import InputError
+from common.units import SLIPS, find_unit, guess_slip
 
-_SCALES = {  # factor -> what a larger number is in, and what the smaller one is in
-    6.0: ("deg/s", "rpm"),
-    2 * math.pi: ("rad", "turns"),
-    30 / math.pi: ("rpm", "rad/s"),
-    10.0: ("mm", "cm"),
-    180 / math.pi: ("degrees", "radians"),
-    60.0: ("s or 1/min", "min or 1/s"),
-    100.0: ("cm or per cent", "m or 1"),
-    360.0: ("degrees", "turns"),
-    1000.0: ("mm", "m"),
-}
 _NEAR = math.log(1.08)  # distance of a factor from that between two units, as logarithms
 _LIKEWISE = math.log(1.5)  # distance within which two outputs have the same factor
 _FEWEST = 3  # runs of a session that are compared
 _LEAST = 0.01  # standard deviation of a session
+_MOST = 100.0  # logarithm that is looked at
+_WITHOUT_UNIT = {100.0: ("number", "per cent"), 180 / math.pi: ("angle", "degrees")}  # factor -> kind, in words
+_NEAR_START = 1.3  # factor between another unit and what is found
+_FAR = 100.0  # factor between what was measured and the model with its start values
 
 
 class Factor(NamedTuple):
@@ -67,14 +66,11 @@ class Factor(NamedTuple):
         """Tell whether another output has this factor, or its inverse."""
         return self.negative == other.negative and abs(self.size[1] - other.size[1]) < _LIKEWISE
 
-    def scale(self) -> float | None:
-        """Return the factor between two units that this may be, as a positive number."""
-        scales = sorted((*([1.0] if self.negative else []), *_SCALES), key=lambda s: self._off(math.log(s)))
+    def slip(self) -> tuple[str, str] | None:
+        """Return two units that this may be the factor between, larger numbers first; empty for a sign alone."""
         near = min(_NEAR, 3 * math.hypot(max(self.scatter, _LEAST), self.error))
-        return scales[0] if self._off(math.log(scales[0])) < near else None
-
-    def _off(self, logarithm: float) -> float:
-        return abs(abs(self.logarithm) - logarithm)
+        slips = SLIPS | ({1.0: ("", "")} if self.negative else {})
+        return guess_slip(math.exp(min(self.size[1], _MOST)), slips, math.exp(near))
 
 
 def refuse_unit_slips(runs: Runs, given: Floats) -> None:
@@ -91,11 +87,10 @@ def refuse_unit_slips(runs: Runs, given: Floats) -> None:
         session = max(known, key=lambda s: (blame[s] or known[s]).size)
         found = known[session]
         others = (of[session] for of in factors if of is not factors[i])
-        if (scale := found.scale()) is None or any(other and found.same(other) for other in others):
+        if (slip := found.slip()) is None or any(other and found.same(other) for other in others):
             continue
-        larger, smaller = _SCALES.get(scale, ("", ""))
-        there, elsewhere = (larger, smaller) if found.logarithm > 0 else (smaller, larger)
-        units = f", as if it were in {there} there and in {elsewhere} in those; convert it" * (scale != 1)
+        there, elsewhere = slip if found.logarithm > 0 else slip[::-1]
+        units = f", as if it were in {there} there and in {elsewhere} in those; convert it" * bool(there)
         sign = "; check its sign" if found.negative else ""
         override = "; if it is right, declare its Output with unit_checked=True" * (name in runs.unit_checked)
         factor = math.exp(found.logarithm) * (-1 if found.negative else 1)
@@ -103,6 +98,27 @@ def refuse_unit_slips(runs: Runs, given: Floats) -> None:
             f"{name} of session {runs.session_names[session]} is {factor:.3g} times that of the other sessions"
             f"{units}{sign}{override}"
         )
+
+
+def refuse_other_units(runs: Runs, given: Floats, outputs: Mapping[str, Output], starts: str) -> None:
+    """Refuse outputs that are in another unit, or far from what a model gives with its `starts`, (n, k)."""
+    for place, (name, output) in enumerate(outputs.items()):
+        found, ratio = _by_model(runs, given, place, np.ones(len(runs), dtype=bool)), output.kind == "ratio"
+        if not found or found.negative or not (ratio or found.error <= _NEAR / 2):
+            continue
+        factor, unit = float(np.exp(found.logarithm)), find_unit(output.unit)
+        kinds = (unit.kind, "angle" if unit.suffix == "1" else "") if unit else ()
+        slips = {of: words for of, (kind, words) in _WITHOUT_UNIT.items() if kind in kinds}
+        if words := guess_slip(factor, slips, _NEAR_START):
+            raise InputError(
+                f"{name} is {factor:.3g} times what the model gives: the table seems to have {words}; convert "
+                "the column or what the function returns, or give other start values"
+            )
+        if ratio and not 1 / _FAR < factor < _FAR:
+            raise InputError(
+                f"{name} is {factor:.3g} times what the model gives with its start values ({starts}): check the "
+                f"units of both, and give start values that come within a factor of {_FAR:g}"
+            )
 
 
 def _compared(runs: Runs, given: Floats, output: int, session: int) -> Factor | None:

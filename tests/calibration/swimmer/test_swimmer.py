@@ -217,7 +217,7 @@ def refused(table: pd.DataFrame, words: str) -> None:
 @pytest.mark.parametrize("name", OTHER_UNITS)
 def test_an_output_in_another_unit_is_refused_with_that_unit(name: str) -> None:
     column = OUTPUTS[name][0]
-    for unit, factor in OTHER_UNITS[name].items():
+    for factor, unit in OTHER_UNITS[name].items():
         table = toy_table(4)
         if column not in table:
             table[column] = np.abs(table["omega_yr_rad_s"]) * table["R_yr_cm"]
