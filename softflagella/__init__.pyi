@@ -1,12 +1,13 @@
 # The public names of softflagella and their modules: the one list, for type checkers and for `__init__.py`.
 from calibration.api import decide as decide
 from calibration.findings.next_runs import Decision as Decision
+from calibration.own_model.declared import Effect as Effect
 from calibration.own_model.declared import Model as Model
 from calibration.own_model.declared import Number as Number
-from calibration.own_model.declared import Output as Output
 from calibration.own_model.model_verdict import ModelVerdict as ModelVerdict
 from calibration.robot.robot_verdict import RobotVerdict as RobotVerdict
 from calibration.swimmer.synthetic_table import make_table as make_table
+from calibration.table.declared import Output as Output
 from calibration.verdict.verdict import Verdict as Verdict
 from camera.api import tracks as tracks
 from common.errors import InputError as InputError
