@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from common.changes import RobotSource
 from common.commands import Call, Program, to_stderr
 from common.errors import InputError
 from common.reading import refuse_missing
@@ -26,7 +27,7 @@ def _decide(decide: Call, table: str) -> None:
 
 @program.command("simulate", effects="effect")
 def _simulate(
-    *, robot: str, out: str, effects: Sequence[str] = (), seed: int = 0, jobs: int | None = None
+    *, robot: RobotSource, out: str, effects: Sequence[str] = (), seed: int = 0, jobs: int | None = None
 ) -> None:
     """Make a table from the simulator, to try the calibration on.
 

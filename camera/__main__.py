@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from common.changes import RobotSource
 from common.commands import Program
 from common.errors import InputError
 
@@ -50,7 +51,7 @@ def _lens(pictures: Sequence[str], *, squares: str = "10x7") -> None:
 def _tracks(
     film: str,
     *,
-    robot: str,
+    robot: RobotSource,
     view: str,
     out: str,
     check: str | None = None,

@@ -1,4 +1,4 @@
-"""Changes that a command makes to the robots that it reads, as `--set fluid.viscosity_Pa_s=0.7`.
+"""Robots with the changes that a command makes to them, as `--set fluid.viscosity_Pa_s=0.7`.
 
 A key is TABLE.KEY of the robot's file, or KEY where the file has no tables; a value is one of TOML, or a text.
 """
@@ -6,38 +6,48 @@ A key is TABLE.KEY of the robot's file, or KEY where the file has no tables; a v
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from common.errors import InputError
 from common.units import split
 
-_asked: dict[str, dict[str, Any]] = {}  # robot, as it was given -> its changes
+RobotSource = str | PathLike[str]  # the path of a robot's file, or the name of a preset; maybe a `ChangedRobot`
 
 
-@contextmanager
-def changing(robots: Iterable[object], words: Sequence[str]) -> Iterator[None]:
-    """Let robots be read in a block with the changes KEY=VALUE.
+@dataclass(frozen=True)
+class ChangedRobot(PathLike[str]):
+    """A robot's file, or the name of a preset, and what is changed in its content."""
+
+    source: str
+    changes: Mapping[str, Any]
+
+    def __fspath__(self) -> str:
+        return self.source
+
+    def __str__(self) -> str:
+        return self.source
+
+
+def changed_robots(sources: Mapping[str, str], words: Sequence[str]) -> dict[str, ChangedRobot]:
+    """Return those of the sources that are robots, not tables, with the changes KEY=VALUE.
 
     Raises:
         InputError: the words are no change, or there is no robot to change.
     """
     changes = dict(map(_read_change, words))
-    named = {str(robot): changes for robot in robots if Path(str(robot)).suffix in ("", ".toml")}
-    if changes and not named:
+    robots = {name: source for name, source in sources.items() if Path(source).suffix in ("", ".toml")}
+    if not robots:
         raise InputError(f"--set {words[0]} changes a robot, and none is given; add --robot ROBOT")
-    _asked.update(named if changes else {})
-    try:
-        yield
-    finally:
-        _asked.clear()
+    return {name: ChangedRobot(source, changes) for name, source in robots.items()}
 
 
-def changes_of(robot: object) -> Mapping[str, Any]:
-    """Return the changes of a robot, by the words that name it."""
-    return _asked.get(str(robot), {})
+def changes_of(source: RobotSource) -> Mapping[str, Any]:
+    """Return what is changed in the content of a robot's file."""
+    return source.changes if isinstance(source, ChangedRobot) else {}
 
 
 def changed(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

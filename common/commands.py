@@ -38,7 +38,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn, TypeVar
 
-from common.changes import changing
+from common.changes import changed_robots
 from common.errors import InputError, InputWarning, run_command
 from common.files import kept
 from common.glossary import terms_in
@@ -278,11 +278,11 @@ class Subcommand(NamedTuple):
     def main(self, prog: str, words: list[str]) -> None:
         """Parse words and run the command."""
         given, names = vars(self.parser(prog).parse_args(words)), self.parameters()[1]
-        changes = given.pop("set", [])
+        changes, inputs = given.pop("set", []), _inputs(given)
+        if changes:
+            given |= changed_robots({name: given[name] for name in _ROBOTS if name in given}, changes)
         own = {name: given.pop(name) for name in [*given] if name in names}
-        written = {**given, **own}
-        robots = [written[name] for name in _ROBOTS if name in written]
-        with kept(_inputs(written)), changing(robots, changes), warnings.catch_warnings():
+        with kept(inputs), warnings.catch_warnings():
             warnings.simplefilter("default", InputWarning)  # each line once
             warnings.showwarning = partial(_show_warning, warnings.showwarning)
             self.run(*([Call(self.of, given)] if self.of else []), **own)

@@ -13,7 +13,6 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import TextIOWrapper
-from pathlib import Path
 
 INTERRUPTED, CLOSED_PIPE = 130, 141  # exit statuses as shells give them: 128 + SIGINT, 128 + SIGPIPE
 _LIMITS = re.compile(
@@ -52,7 +51,7 @@ def naming(source: object) -> Iterator[None]:
         yield
     except InputError as refusal:
         message = " ".join(str(refusal).split())
-        known = not isinstance(source, str | Path) or str(source) in message
+        known = not isinstance(source, str | os.PathLike) or str(source) in message
         raise type(refusal)(message if known else f"{source}: {message}") from None
 
 

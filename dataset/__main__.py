@@ -6,7 +6,7 @@ import os
 import shlex
 import threading
 
-from common.changes import changes_of
+from common.changes import ChangedRobot, RobotSource
 from common.commands import Call, Program
 from common.errors import InputError
 
@@ -76,7 +76,7 @@ def _verify(
 
 
 @program.command("config")
-def _config(*, out: str, robot: str | None = None) -> None:
+def _config(*, out: str, robot: RobotSource | None = None) -> None:
     """Write a sweep.toml, to edit.
 
     Args:
@@ -92,7 +92,7 @@ def _config(*, out: str, robot: str | None = None) -> None:
 
     if robot is None:
         text = SWEEP_TOML.read_text()
-    elif changes_of(robot):
+    elif isinstance(robot, ChangedRobot):
         raise InputError(f"a sweep.toml names the file of its robot, {robot}; change that, not --set")
     else:
         source = robot if robot in PRESETS else os.path.relpath(robot, os.path.dirname(os.path.abspath(out)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING, Any, TypedDict
 
+from common.changes import ChangedRobot, RobotSource
 from common.commands import Call, Program
 from common.errors import InputError
 from planner.paths.units import in_lab
@@ -93,24 +94,23 @@ def _job(job: Call, *, out: str, **folders: Unpack[BoardOptions]) -> None:
 
 
 @program.command("robot")
-def _robot(preset: str, *, out: str) -> None:
+def _robot(preset: RobotSource, *, out: str) -> None:
     """Write a preset robot, or a vehicle of five measured numbers, as TOML to edit.
 
     Args:
         preset: paper-control, paper-triangle or paper-measured; or vehicle.
         out: robot.toml, or vehicle.toml.
     """
-    from common.changes import changes_of
     from common.files import write_text
     from planner.vehicle.measured import EXAMPLE
     from sim.inputs import load_robot, save_robot
     from sim.model.presets import PRESETS
 
-    if preset not in (*PRESETS, "vehicle"):
+    if str(preset) not in (*PRESETS, "vehicle"):
         raise InputError(f"no preset {preset!r}; there are {', '.join(PRESETS)} and vehicle")
-    if preset != "vehicle":
+    if str(preset) != "vehicle":
         save_robot(load_robot(preset), out)
-    elif changes_of(preset):
+    elif isinstance(preset, ChangedRobot):
         raise InputError(f"--set changes presets; leave it out, and edit {out}")
     else:
         write_text(out, EXAMPLE)

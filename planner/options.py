@@ -10,6 +10,7 @@ import difflib
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields, replace
+from os import PathLike
 from pathlib import Path
 from typing import Any, TypedDict
 
@@ -189,7 +190,7 @@ def swimmer_of(robot: AnyVehicle) -> Robot | MeasuredVehicle:
         return robot.robot
     if isinstance(robot, CalibratedRobot):
         return robot.corrected
-    if isinstance(robot, str | Path) and MeasuredVehicle.is_in(robot):
+    if isinstance(robot, str | PathLike) and MeasuredVehicle.is_in(robot):
         return MeasuredVehicle.load(robot)
     return robot if isinstance(robot, MeasuredVehicle) else one_robot(robot)
 
@@ -204,7 +205,7 @@ def table_of(
         swims: the robot.
         options: see `TableOptions`.
     """
-    source = None if isinstance(robot, Robot) else str(robot)
+    source = None if isinstance(robot, Robot) else robot
     known = options.get("knowledge") or (CalibrationKnowledge() if source is None else read_knowledge(source))
     lookup = options.get("lookup")
     if isinstance(lookup, str | Path):

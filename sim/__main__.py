@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from common.changes import RobotSource
 from common.commands import Call, Program
 from common.errors import InputError
 
@@ -20,9 +21,9 @@ main = program.main
 @program.command("steady", of="sim.api:steady")
 def _steady(
     steady: Call,
-    robots: str,
+    robots: RobotSource,
     *,
-    robot: str | None = None,
+    robot: RobotSource | None = None,
     out: str | None = None,
     shapes: str | None = None,
     vary: Sequence[str] = (),

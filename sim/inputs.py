@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from common.arrays import Floats
-from common.changes import changed, changes_of
+from common.changes import RobotSource, changed, changes_of
 from common.errors import InputError, InputWarning, naming
 from common.files import write_text
 from common.keywords import checks_keywords
@@ -94,17 +94,15 @@ def run_columns(table: pd.DataFrame, robot: Robot, where: str) -> tuple[list[Rob
     return robots, {**columns, "omega_bar": columns["omega_bar"] * np.array(directions)}
 
 
-def names_robot(source: str | Path) -> bool:
+def names_robot(source: RobotSource) -> bool:
     """Tell whether words name a robot, a preset or a robot.toml, rather than a table of points."""
     path = Path(source)
     return str(source) in PRESETS or path.suffix == ".toml" or not (path.suffix or path.exists())
 
 
 @checks_keywords
-def load_robot(source: str | Path) -> Robot:
+def load_robot(source: RobotSource) -> Robot:
     """Load a robot from a preset's name or a robot.toml; an `InputWarning` asks about doubtful units.
-
-    A command reads its robot with the changes of `--set` (`common.changes`).
 
     Args:
         source: path of a file, or one of `sim.model.presets.PRESETS`.
@@ -133,7 +131,7 @@ def load_robot(source: str | Path) -> Robot:
     return robot
 
 
-def robot_content(source: str | Path) -> dict[str, Any]:
+def robot_content(source: RobotSource) -> dict[str, Any]:
     """Return the content of a robot.toml, or that of a preset.
 
     Raises:
@@ -144,7 +142,7 @@ def robot_content(source: str | Path) -> dict[str, Any]:
     if not Path(source).exists():
         raise InputError(f"no robot {str(source)!r}; give a robot.toml or one of {', '.join(PRESETS)}")
     with naming(source):
-        return read_toml(source)
+        return read_toml(Path(source))
 
 
 def robot_of(content: Mapping[str, Any], name: str) -> Robot:

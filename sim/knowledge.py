@@ -25,7 +25,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from common.arrays import Floats
-from common.changes import changes_of
+from common.changes import RobotSource, changes_of
 from common.errors import InputError, InputWarning, naming
 from common.reading import read_toml
 from sim.effects import is_effect
@@ -124,7 +124,7 @@ UNMEASURED = CalibrationKnowledge(COEFFICIENTS, np.diag(np.square([0.35, 0.22, 0
 found (docs/results-calibration.md and the paper's two)."""
 
 
-def read_knowledge(path: str | Path) -> CalibrationKnowledge:
+def read_knowledge(path: RobotSource) -> CalibrationKnowledge:
     """Read the table [calibration] of a robot.toml; nothing is known where there is no such file or table.
 
     What a command gives with --set is no longer what was fitted, so it loses its row and column of the covariance.
@@ -134,7 +134,7 @@ def read_knowledge(path: str | Path) -> CalibrationKnowledge:
     """
     if not Path(path).is_file():
         return CalibrationKnowledge()
-    known = CalibrationKnowledge.from_dict(read_toml(path).get("calibration", {}), path)
+    known = CalibrationKnowledge.from_dict(read_toml(Path(path)).get("calibration", {}), path)
     given = {field_of(key): key for key in changes_of(path)}
     kept = [k for k, name in enumerate(known.names) if name not in given]
     if lost := [given[name] for name in known.names if name in given]:

@@ -18,12 +18,14 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from common.arrays import Floats
+from common.changes import RobotSource
 from common.errors import InputError, naming
 from common.files import is_stream, refuse_folder
 from common.journal import Journal, journal
@@ -42,7 +44,7 @@ UNITS = {  # of dimensionless columns whose name does not say it
     "tail_gap": "2 r0",
 }
 
-OneRobot = Robot | str | Path
+OneRobot = Robot | RobotSource
 if TYPE_CHECKING:  # one robot needs no pandas
     import pandas as pd
 
@@ -97,7 +99,7 @@ class RobotRows:
         return table
 
 
-def command_rows(robots: str, robot: str | None, out: str | None, *beside: str) -> RobotRows:
+def command_rows(robots: RobotSource, robot: RobotSource | None, out: str | None, *beside: str) -> RobotRows:
     """Read the robots of a command: one, or a table of points or runs, whose motion needs a file `out`.
 
     Raises:
@@ -108,7 +110,7 @@ def command_rows(robots: str, robot: str | None, out: str | None, *beside: str) 
     if out is None and not names_robot(robots):
         from common.tables import read_table
 
-        read_table(robots)  # refuses what is no table
+        read_table(str(robots))  # refuses what is no table
         raise InputError(f"{robots} is a table of points; name the file of their motion with --out")
     return robot_rows(robots, robot, *beside)
 
@@ -138,17 +140,17 @@ def robot_rows(robots: Robots, robot: OneRobot | None = None, *beside: str) -> R
     Raises:
         InputError: a robot cannot be simulated, or columns differ in length.
     """
-    if isinstance(robots, str | Path) and not names_robot(robots):
+    if isinstance(robots, str | PathLike) and not names_robot(robots):
         from common.tables import read_table
 
-        return _table_rows(read_table(robots), robot, robots, beside)
-    if not isinstance(robots, Robot | str | Path | Sequence):
+        return _table_rows(read_table(str(robots)), robot, str(robots), beside)
+    if not isinstance(robots, Robot | str | PathLike | Sequence):
         return _table_rows(robots, robot, None, beside)
     if robot is not None:
         raise InputError(
             "robot goes with a table of runs, with N, l_cm, omega_rpm, and robots are given; leave one of them out"
         )
-    given = [robots] if isinstance(robots, Robot | str | Path) else list(robots)
+    given = [robots] if isinstance(robots, Robot | str | PathLike) else list(robots)
     if not given:
         raise InputError("no robots; give at least one")
     loaded = tuple(map(one_robot, given))
@@ -180,7 +182,7 @@ def one_robot(robot: OneRobot) -> Robot:
     Raises:
         InputError: it is neither, or its file cannot be read.
     """
-    if not isinstance(robot, Robot | str | Path):
+    if not isinstance(robot, Robot | str | PathLike):
         raise InputError(f"a {type(robot).__name__} is no robot; give a Robot, a robot.toml or a preset's name")
     return robot if isinstance(robot, Robot) else load_robot(robot)
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from common.arrays import Flags, Floats
-from common.changes import changed, changes_of
+from common.changes import RobotSource, changed, changes_of
 from common.errors import InputError
 from common.units import split
 from sim.inputs import check_columns, group_columns, load_robot, names_robot, robot_content, robot_of
@@ -69,7 +69,7 @@ def read_variation(words: str) -> Variation:
 
 
 def vary(
-    source: str, variations: Sequence[Variation], solve: Callable[[RobotRows], Mapping[str, Any]]
+    source: RobotSource, variations: Sequence[Variation], solve: Callable[[RobotRows], Mapping[str, Any]]
 ) -> pd.DataFrame:
     """Solve robots with varied numbers; return a row for each, the first variation fastest.
 
@@ -118,7 +118,7 @@ def vary(
 
 
 def write_variations(
-    source: str,
+    source: RobotSource,
     words: Sequence[str],
     solve: Callable[[RobotRows], Mapping[str, Any]],
     out: str | None,

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 
+from common.changes import RobotSource
 from common.commands import Call, Program, Subcommand, to_stderr
 from common.errors import InputError, run_command
 from common.reading import refuse_missing
@@ -58,7 +59,7 @@ def _calibrate(
     calibrate: Call,
     table: str = "",
     *,
-    robot: str | None = None,
+    robot: RobotSource | None = None,
     model: str | None = None,
     out: str,
     films: str | None = None,
@@ -152,7 +153,7 @@ def _compare(files: Sequence[str], *, plan: str | None = None, plot: str | None 
         print(f"-> {plot}")
 
 
-def _filmed(films: str, view: str, robot: str, out: str) -> str:
+def _filmed(films: str, view: str, robot: RobotSource, out: str) -> str:
     """Measure films; write table.csv and return its path."""
     from camera.measured_films import measure_films
     from common.files import make_folder, write_csv

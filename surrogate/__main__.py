@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
+from common.changes import RobotSource
 from common.commands import Call, Program
 from common.errors import InputError
 
@@ -59,7 +60,12 @@ def _train(
 
 @program.command("query", of="surrogate.api:query", derivatives="")
 def _query(
-    query: Call, robots: str, *, robot: str | None = None, out: str | None = None, lookup: str | None = None
+    query: Call,
+    robots: RobotSource,
+    *,
+    robot: RobotSource | None = None,
+    out: str | None = None,
+    lookup: str | None = None,
 ) -> None:
     """Predict the motion of a robot, or of many, with intervals, without simulating.
 
@@ -121,7 +127,7 @@ def _errors(*, lookup: str | None = None) -> None:
 
 
 @program.command("robot")
-def _robot(robot: str, *, out: str) -> None:
+def _robot(robot: RobotSource, *, out: str) -> None:
     """Simulate the table of one robot, effects included.
 
     Args:

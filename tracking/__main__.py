@@ -9,6 +9,7 @@ from contextlib import AbstractContextManager, nullcontext, redirect_stdout
 from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any
 
+from common.changes import RobotSource
 from common.commands import Call, Program
 from common.errors import InputError
 from common.units import format_length, format_time
@@ -27,7 +28,7 @@ def _track(
     plan_path: Call,
     path: str,
     *,
-    robot: str | None = None,
+    robot: RobotSource | None = None,
     start: tuple[str, str, str] | None = None,
     noise: str = "0.01l",
     noise_rad: float = 0.01,
@@ -165,7 +166,7 @@ def _saved(path: str, *, unit: str | None = None, lookup: str | None = None, own
 def _replay(
     plan: str,
     *,
-    robot: str | None = None,
+    robot: RobotSource | None = None,
     out: str | None = None,
     error: bool = True,
     shapes: str | None = None,

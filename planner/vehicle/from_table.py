@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from common.arrays import Floats
-from common.changes import changes_of
+from common.changes import ChangedRobot, RobotSource
 from common.errors import InputError
 from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Vehicle, lag_table, resampled
 from planner.vehicle.zigzag import LONGEST
@@ -56,7 +56,7 @@ def default_table() -> LookupTable:
 
 
 def table_for(
-    robot: Robot, source: str | None, knowledge: CalibrationKnowledge, *, own: bool = False
+    robot: Robot, source: RobotSource | None, knowledge: CalibrationKnowledge, *, own: bool = False
 ) -> LookupTable:
     """Load the package's table if it knows a robot, else the robot's own; simulate that where there is none.
 
@@ -78,7 +78,9 @@ def table_for(
             reason = f"{str(unknown).partition('; ')[0]}: "
         else:
             return shipped
-    kept = None if source is None or source in PRESETS or changes_of(source) else Path(source).with_suffix(ENDING)
+    kept = None
+    if source is not None and str(source) not in PRESETS and not isinstance(source, ChangedRobot):
+        kept = Path(source).with_suffix(ENDING)
     table = _kept_table(robot, kept, knowledge)
     if table is None:
         if robot.omega_bar < _STIFF:

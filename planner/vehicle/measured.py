@@ -26,7 +26,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from common.arrays import Floats
-from common.changes import changed, changes_of
+from common.changes import RobotSource, changed, changes_of
 from common.errors import InputError, naming
 from common.reading import read_toml
 from common.units import UNITS, of_kind, split, to_si
@@ -180,19 +180,19 @@ class MeasuredVehicle:
         return twist, lags, _relaxation(np.zeros((2, 3)), twist, lag / time)
 
     @staticmethod
-    def is_in(path: str | Path) -> bool:
+    def is_in(path: RobotSource) -> bool:
         """Tell whether a TOML file describes a vehicle."""
         file = Path(path)
-        return file.suffix == ".toml" and file.is_file() and describes_vehicle(read_toml(path))
+        return file.suffix == ".toml" and file.is_file() and describes_vehicle(read_toml(file))
 
     @staticmethod
-    def load(path: str | Path) -> MeasuredVehicle:
+    def load(path: RobotSource) -> MeasuredVehicle:
         """Read a vehicle.toml: keys with units, each a number or [number, standard deviation].
 
         Raises:
             InputError: the file does not describe a vehicle; the message names the key.
         """
-        content = changed(read_toml(path), changes_of(path))
+        content = changed(read_toml(Path(path)), changes_of(path))
         with naming(path):
             return MeasuredVehicle.from_dict({"name": Path(path).stem, **content})
 

@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from common.changes import ChangedRobot
 from common.errors import InputError
 from planner.vehicle import from_table
 from sim.inputs import load_robot
 from sim.knowledge import CalibrationKnowledge, knowledge_toml
+from sim.robot_rows import robot_rows
 from softflagella.__main__ import main, program_of
 from softflagella.shadowing import COMMANDED
 
@@ -67,6 +69,13 @@ def test_a_robot_is_written_with_its_changes_and_only_then(robot: Path) -> None:
     thin = load_robot("thin.toml")
     assert (thin.name, thin.viscosity, thin.effects) == ("thin", 0.7, {"end_over_end_drag": 5})
     assert load_robot("paper-control") == load_robot(robot)
+
+
+def test_changes_are_of_the_robot_that_has_them(robot: Path) -> None:
+    faster = ChangedRobot("paper-control", {"motor.speed_rpm": 60.0})
+    speeds = [load_robot(each).motor_speed for each in ("paper-control", faster, robot, "paper-control")]
+    assert speeds[1] > speeds[0] == speeds[2] == speeds[3]
+    assert [each.name for each in robot_rows([faster, "paper-control"]).robots] == ["paper-control"] * 2
 
 
 def test_a_plan_is_that_of_the_changed_robot(robot: Path) -> None:
