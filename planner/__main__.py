@@ -107,7 +107,7 @@ def _robot(preset: RobotSource, *, out: str) -> None:
     from sim.model.presets import PRESETS
 
     if str(preset) not in (*PRESETS, "vehicle"):
-        raise InputError(f"no preset {preset!r}; there are {', '.join(PRESETS)} and vehicle")
+        raise InputError(f"no preset {str(preset)!r}; there are {', '.join(PRESETS)} and vehicle")
     if str(preset) != "vehicle":
         save_robot(load_robot(preset), out)
     elif isinstance(preset, ChangedRobot):

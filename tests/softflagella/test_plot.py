@@ -41,8 +41,9 @@ def test_a_motion_is_two_circles_of_the_simulated_radius() -> None:
     drawn = sf.plot.motion("paper-control", ax=(ax := axes()))
     assert drawn is ax
     (radius,) = sf.steady(CONTROL)["R_yr_cm"]
-    for line in ax.get_lines()[:2]:
+    for line, side in zip(ax.get_lines()[:2], (1, -1), strict=True):
         x, y = np.asarray(line.get_xydata()).T
+        assert np.sign(y.mean()) == np.sign(np.diff(y)[0]) == side  # a motor at +1 turns left
         assert np.ptp(x) / 2 == pytest.approx(radius, rel=1e-3)
         assert np.ptp(y) / 2 == pytest.approx(radius, rel=1e-3)
     assert ax.get_xlim()[1] > np.max(ax.get_lines()[0].get_xdata())  # the circle is within the frame

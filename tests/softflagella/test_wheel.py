@@ -57,10 +57,11 @@ def test_the_demo_s_sweep_runs_from_the_wheel(wheel: Path, tmp_path: Path) -> No
     code = (
         "import softflagella.demo as demo, softflagella as sf, pathlib\n"
         f"assert demo.__file__.startswith({str(wheel)!r}), demo.__file__\n"
-        "robot, motions = demo._look(pathlib.Path('.'))\n"
-        "assert len(motions) == 2 and sf.load_robot('robot.toml').tails == 2\n"
+        "demo.run_steps(demo.CHAINS[:1], pathlib.Path('.'))\n"
+        "assert sf.load_robot('robot.toml').tails == 2\n"
         "from dataset.design import load_design\n"
-        "assert load_design().rows > load_design(demo.SWEEP_TOML).rows > 0\n"
+        "from softflagella.demo_steps import SWEEP_TOML\n"
+        "assert load_design().rows > load_design(SWEEP_TOML).rows > 0\n"
     )
     cache = next((ROOT / "sim" / "__pycache__").glob("compiled-*"), None)
     if cache:  # machine code does not depend on the folder of its sources
