@@ -74,11 +74,6 @@ class Page:
         """Add a paragraph; tone "good" or "bad" colours it."""
         self._add('<p class="{}">{}</p>', tone, inline(words))
 
-    def steps(self, steps: Sequence[str], *, numbered: bool = False) -> None:
-        """Add a list of sentences."""
-        kind = "ol" if numbered else "ul"
-        self._add(f"<{kind}>{{}}</{kind}>", _joined("<li>{}</li>", ((inline(step),) for step in steps)))
-
     def commands(self, lines: Sequence[str]) -> None:
         """Add commands to type, one a line."""
         self._add("<pre><code>{}</code></pre>", "\n".join(lines))
@@ -87,11 +82,6 @@ class Page:
         """Add a list of links to files: path relative to the page, name, and what it is."""
         items = ((quote(path), name, inline(words)) for path, name, words in links)
         self._add("<ul>{}</ul>", _joined('<li><a href="{}">{}</a>: {}</li>', items))
-
-    def link_line(self, words: str, links: Sequence[tuple[str, str]]) -> None:
-        """Add a line of links to files behind some words: path relative to the page, and name."""
-        anchors = ((quote(path), name) for path, name in links)
-        self._add("<p>{}: {}</p>", inline(words), _joined('<a href="{}">{}</a>', anchors, ", "))
 
     def table(self, header: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
         """Add a table; the first column is left-aligned."""
@@ -128,9 +118,9 @@ class Page:
         write_text(path, template.render(content, light=variables(1), dark=variables(2)))
 
 
-def _joined(markup: str, items: Iterable[Sequence[object]], between: str = "") -> Markup:
+def _joined(markup: str, items: Iterable[Sequence[object]]) -> Markup:
     """Fill markup with each of the items, and join the results."""
-    return Markup(between).join(Markup(markup).format(*words) for words in items)
+    return Markup("").join(Markup(markup).format(*words) for words in items)
 
 
 def figures_markup(figures: Sequence[tuple[Figure, str, str]], first: int) -> Markup:

@@ -170,10 +170,10 @@ def _style(
     axes.set_title(title, fontsize=9)
     if "x" in logarithmic:
         axes.set_xscale("log")
-        plain_logarithms(axes.xaxis)
+        _label_plainly(axes.xaxis)
     if "y" in logarithmic:
         axes.set_yscale("log")
-        plain_logarithms(axes.yaxis)
+        _label_plainly(axes.yaxis)
     axes.tick_params(axis=numbered, labelsize=7)
     axes.grid(axis=numbered, alpha=0.25, lw=0.5)
 
@@ -199,12 +199,9 @@ def _finished(figure: Figure, **legend: Any) -> Figure:
     return figure
 
 
-def plain_logarithms(axis: Axis, multiples: Sequence[float] = (1.0, 2.0, 5.0)) -> None:
-    """Label a logarithmic axis with a few plain numbers: `multiples` of 1, 10, ….
-
-    A narrow axis over more than two decades has room for the powers of ten alone.
-    """
-    axis.set_major_locator(LogLocator(subs=multiples, numticks=8))
+def _label_plainly(axis: Axis) -> None:
+    """Label a logarithmic axis with a few plain numbers: 1, 2 and 5 times 1, 10, …."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
     axis.set_minor_locator(NullLocator())
