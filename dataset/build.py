@@ -23,9 +23,8 @@ from shlex import quote
 from types import FrameType
 from typing import Any, cast
 
-from tqdm import tqdm
-
 from common.errors import InputError
+from common.progress import progress_bar
 from dataset.card import write_card
 from dataset.clusters import check_backend, open_backend
 from dataset.data_set import (
@@ -174,9 +173,10 @@ class _Build:
         sweep, address = self._sweep, self.folder.address
         known = (address, sweep["config"], self._key, sweep["code"], grid, self._simulate)
         chunks = [Chunk(*known, start, stop) for start, stop in cut(gaps, grid[0])]
-        hidden = not self._title or None  # None: a bar on a terminal, not in a file
-        settings: dict[str, Any] = {"unit": "row", "delay": 1.0, "smoothing": 0.0, "disable": hidden}
-        with tqdm(total=self._rows, initial=_size(self._parts), desc=self._title, **settings) as bar:
+        done, hidden = _size(self._parts), not self._title
+        with progress_bar(
+            self._title, total=self._rows, initial=done, unit="row", smoothing=0.0, disable=hidden
+        ) as bar:
             try:
                 for part in run(chunks, backend, bar.set_postfix_str):
                     self._parts.append(part)

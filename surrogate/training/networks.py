@@ -32,10 +32,10 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 from torch.nn.utils import parameters_to_vector, vector_to_parameters
-from tqdm import tqdm
 
 from common.errors import InputError
 from common.files import whole_file
+from common.progress import progress_bar
 from common.provenance import fingerprint
 from surrogate.network import SHARED, Ensemble, state_shapes
 from surrogate.training.bfgs import Minimiser
@@ -288,13 +288,8 @@ def fit(
     if state["stage"] != "done":
         stages = -(-settings.iterations // _STAGE)
         total = settings.epochs + stages * settings.members
-        shown: Any = {
-            "desc": context.title,
-            "disable": not context.title or None,
-            "delay": 1.0,
-            "initial": _steps(state, settings),
-        }
-        with tqdm(total=total, **shown) as bar:
+        begun, hidden = _steps(state, settings), not context.title
+        with progress_bar(context.title, total=total, initial=begun, disable=hidden) as bar:
 
             def show(trained: TrainableEnsemble) -> None:
                 """Advance the bar and show the error that 95 % of the learned rows do not reach."""
