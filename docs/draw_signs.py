@@ -1,7 +1,7 @@
 """Draw the pictures of docs/reference/signs.md: the robot from above and from behind, and a camera's picture.
 
-The robot is the paper's control robot (`sim.motion.robot_views`). Each picture can be read on a screen 390 pixels
-wide. A test compares the files in docs with the drawings.
+The robot is the paper's control robot (`sim.pictures.robot_views`). Each picture can be read on a screen 390
+pixels wide. A test compares the files in docs with the drawings.
 
 Usage: python docs/draw_signs.py [FOLDER]
 """
@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 from sim.model.presets import PRESETS
-from sim.motion.robot_views import (
+from sim.pictures.robot_views import (
     INK,
     PALE,
     SIZE,

@@ -133,7 +133,7 @@ def _film(plan: str, *, out: str, speed: float | None = None, width: int = 640) 
     """
     from common.progress import progress_bar
     from sim.model.schedule import load_schedule, read_plan_file
-    from sim.motion.film import FilmSettings, fitting_speed, write_film
+    from sim.pictures.film import FilmSettings, fitting_speed, write_film
 
     if not 100 <= width <= 2000:
         raise InputError(f"--width {width}; give 100 to 2000 pixels")

@@ -16,8 +16,8 @@ from common.pages import Page
 from common.provenance import code_version
 from common.units import format_time
 from sim.model.presets import INDEPENDENT, PRESETS
-from sim.motion.robot_views import draw_from_above, scene
 from sim.motion.steady_motion import lab_motion
+from sim.pictures.robot_views import draw_from_above, scene
 from softflagella.demo_steps import Done
 
 _DOCS = Path(__file__).parents[1] / "docs"

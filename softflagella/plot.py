@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 @checks_types
 def motion(robot: Robot | str | Path, *, ax: Axes | None = None) -> Axes:
     """Simulate a robot, and draw the circle of its head's centre for each direction of the motor, in cm."""
-    from sim.motion.robot_views import plot_circles
     from sim.motion.steady import steady
+    from sim.pictures.robot_views import plot_circles
     from sim.robot_rows import one_robot
 
     given = one_robot(robot)

@@ -19,7 +19,7 @@ from tests.processes import LIMIT, ROOT
 
 # Each imports those before it.
 ORDER = ("common", "sim", "camera", "dataset", "surrogate", "planner", "tracking", "calibration", "softflagella")
-ROBOTS = {"model", "effects", "inputs", "mechanics", "solve", "motion"}  # rooms of `sim` that know robots
+ROBOTS = {"model", "effects", "inputs", "mechanics", "solve", "motion", "pictures"}  # rooms that know robots
 
 
 @cache

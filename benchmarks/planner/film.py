@@ -8,7 +8,7 @@ Takes half a minute.
 from __future__ import annotations
 
 import softflagella as sf
-from sim.motion.film import FilmSettings, write_film
+from sim.pictures.film import FilmSettings, write_film
 
 SPEED = 50.0  # times that of the robot
 

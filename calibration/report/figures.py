@@ -30,7 +30,7 @@ from calibration.words.quantities import feature_in_words, final_model
 from common.arrays import Flags, Floats
 from common.pages import BLUE, GREEN, INK, ORANGE, PALE, RED, VIOLET
 from sim.model.robot import Robot
-from sim.motion.robot_views import arrow, curved_arrow, draw_robot, scene
+from sim.pictures.robot_views import arrow, curved_arrow, draw_robot, scene
 
 _WIDTH = 4.4  # inches
 _KINDS = (BLUE, ORANGE, GREEN, VIOLET, RED)

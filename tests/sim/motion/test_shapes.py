@@ -1,10 +1,9 @@
-"""Shapes as data and as films: nodes hang on the robot, forces balance, files say what was simulated."""
+"""Shapes as data: nodes hang on the robot, forces balance, files say what was simulated."""
 
 from __future__ import annotations
 
 import json
 import re
-import shutil
 import xml.etree.ElementTree as ET
 from base64 import b64decode
 from dataclasses import replace
@@ -12,8 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
-from PIL import Image
 from scipy.interpolate import interp1d
 
 from common.errors import InputError, run_command
@@ -21,7 +18,6 @@ from sim.__main__ import main
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.schedule import Schedule
-from sim.motion.film import FilmSettings, _draw_scale_bar, fitting_speed, write_film
 from sim.motion.replay import replay
 from sim.motion.shape_files import equal_times, shape_arrays, write_shapes
 from sim.motion.shapes import nodes_in_body, scheduled_shapes, steady_shapes, steady_states
@@ -196,10 +192,6 @@ def test_the_command_writes_the_shapes_of_one_robot(tmp_path: Path, capsys: pyte
     assert "ends in .npz, or in .pvd" in capsys.readouterr().err
 
 
-LINE = [[0.0, 0.0], [1.0, 0.5]]
-CONTENT = {"raw_path": LINE, "reference": LINE, "closed": False}
-
-
 def schedule(*dwells: float) -> Schedule:
     start = (0.3, -0.2, 0.7)
     return Schedule(ROBOT.group_values(), -1, np.array(dwells), start, ROBOT.time_scale, ROBOT.tail_length)
@@ -215,13 +207,6 @@ def test_poses_and_directions_are_those_of_a_replay() -> None:
             assert np.abs(frames.track[-1, 1 + k] - track[name].iloc[-1]) < 1e-3
     assert frames.directions.tolist() == [-1] * 14 + [1] * 10 + [-1] * 17
     assert scheduled_shapes(wanted, np.cumsum(wanted.dwells)).directions.tolist() == [1, -1, -1]  # after the flips
-
-
-def test_no_frame_is_lost_where_rounded_dwells_end() -> None:
-    for seed in (1, 8):  # sums of dwells that depend on the order
-        wanted = schedule(*np.random.default_rng(seed).uniform(0.05, 0.1, 20))
-        times = FilmSettings(speed=wanted.time_scale).times(wanted)
-        assert len(scheduled_shapes(wanted, times).heads) == len(times)
 
 
 def test_tails_are_those_of_a_steadily_swimming_robot() -> None:
@@ -240,48 +225,3 @@ def test_tails_are_those_of_a_steadily_swimming_robot() -> None:
 def resampled(tails: np.ndarray) -> np.ndarray:
     """Return tails (..., n, 2) at thirteen places."""
     return np.asarray(interp1d(np.linspace(0, 1, tails.shape[-2]), tails, axis=-2)(np.linspace(0, 1, 13)))
-
-
-def test_a_film_has_a_picture_for_each_of_its_times(tmp_path: Path) -> None:
-    wanted = schedule(1.0, 1.0)
-    film = FilmSettings(speed=2.0 * ROBOT.time_scale, width=200)
-    count = write_film(CONTENT, wanted, tmp_path / "swim.gif", film)
-    with Image.open(tmp_path / "swim.gif") as image:
-        assert count == 13
-        assert image.size[0] == 200
-        assert 60 <= image.size[1] <= 300
-        first = np.asarray(image.convert("RGB")).astype(int)
-        image.seek(image.n_frames - 1)
-        assert np.abs(np.asarray(image.convert("RGB")).astype(int) - first).max() > 100
-    write_film(CONTENT, wanted, tmp_path / "swim.webp", film)
-    assert (tmp_path / "swim.webp").read_bytes()[8:12] == b"WEBP"
-
-
-def test_the_scale_bar_is_as_long_as_it_says_and_the_speed_is_a_round_number() -> None:
-    for width, words in ((60.0, "10 cm"), (24.0, "2 cm"), (3.0, "0.5 cm")):
-        axes = Figure().add_subplot()
-        axes.set_xlim(-5.0, width - 5.0)
-        _draw_scale_bar(axes, width, "cm")
-        low, high = axes.lines[0].get_xdata()
-        assert axes.texts[0].get_text() == words == f"{high - low:g} cm"
-        assert low + high == pytest.approx(sum(axes.get_xlim()))
-    assert fitting_speed(schedule(60.0)) in (1, 2, 5, 10, 20, 50, 100)
-    assert fitting_speed(schedule(0.5)) == 1.0
-
-
-def test_a_film_that_cannot_be_written_leaves_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    wanted, film = schedule(1.0), FilmSettings(speed=1.0)
-    with pytest.raises(InputError, match=r"ends in \.gif, \.webp, \.mp4"):
-        write_film(CONTENT, wanted, tmp_path / "swim.avi", film)
-    monkeypatch.setattr(shutil, "which", lambda name: None)
-    with pytest.raises(InputError, match=r"needs ffmpeg.*write a \.gif"):
-        write_film(CONTENT, wanted, tmp_path / "swim.mp4", film)
-    with pytest.raises(InputError, match="pictures; give"):
-        write_film(CONTENT, schedule(2000.0), tmp_path / "swim.gif", film)
-    with pytest.raises(InputError, match="number above 0"):
-        write_film(CONTENT, wanted, tmp_path / "swim.gif", FilmSettings(speed=-1.0))
-    assert run_command(main, ["film", "plan.json", "--out", str(tmp_path / "no.gif"), "--width", "10"]) == 2
-    assert capsys.readouterr().err == "error: --width 10; give 100 to 2000 pixels\n"
-    assert list(tmp_path.iterdir()) == []
