@@ -33,10 +33,10 @@ from common.arrays import Floats
 from common.errors import InputError
 from planner.files.saved_plan import restore_plan
 from planner.guidance.law import REST
+from planner.guidance.line_of_sight import LineOfSight
 from planner.jobs.plan import plan as plan_path
 from planner.paths.distance import closest_segment
 from planner.paths.path import arc_length, polygon
-from planner.planning.line_of_sight import LineOfSight
 from planner.planning.plan import Plan
 from planner.planning.request import Camera
 from sim.mechanics import planar

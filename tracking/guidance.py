@@ -24,10 +24,10 @@ import numpy as np
 
 from common.arrays import Floats, Integers
 from planner.guidance.law import NO_WAY, SEGMENTS, Segment, excess
+from planner.guidance.line_of_sight import LineOfSight, look_ahead
 from planner.paths.dubins import TURNS, DubinsPaths, segment_lengths
 from planner.paths.tractrix import Drift
 from planner.planning.conditions import OVERLAP
-from planner.planning.line_of_sight import LineOfSight, look_ahead
 from planner.planning.plan import Plan
 from sim.mechanics.planar import POSE
 

@@ -25,7 +25,7 @@ The alarm means that the robot is incompatible with the model. It compares WINDO
 ones: for a robot of the model the sum of their squared residuals is below a limit with probability 1 −
 FALSE_ALARM. It is also raised when LOST poses in a row were rejected.
 
-The next flip is the root of the same equation as in planning (`planner.planning.line_of_sight`), from the
+The next flip is the root of the same equation as in planning (`planner.guidance.line_of_sight`), from the
 estimated pose and with the estimated robot. It is never before the shortest dwell, whatever the input.
 
 Poses are those of the head's centre in l and rad; times in μ0 l⁴/EI. `tracking.pipe` has seconds.

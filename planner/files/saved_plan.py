@@ -21,12 +21,12 @@ from common.errors import InputError
 from common.keywords import checks_keywords
 from common.reading import expecting, read_bytes, read_json
 from planner.goal.trip import FORMAT, Trip
+from planner.guidance.line_of_sight import Guidance
 from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Reference
 from planner.planning.conditions import KeptClear, Lap
 from planner.planning.declare import FeasiblePath
-from planner.planning.line_of_sight import Guidance
 from planner.planning.plan import GUARANTEE, KINDS, Plan
 from planner.planning.request import DOCUMENTED, Camera, PlanRequest
 from planner.planning.stated_error import PlanErrors, predicted_error

@@ -20,13 +20,13 @@ import numpy as np
 
 from common.arrays import Floats
 from common.errors import InputError
+from planner.guidance.line_of_sight import follow
 from planner.planning.conditions import OVERLAP, Lap
 from planner.planning.declare import FeasiblePath
-from planner.planning.line_of_sight import follow
 from planner.planning.plan import J, Plan
-from planner.planning.request import ProgressCallback
 from planner.planning.solve import Trial
 from planner.planning.stated_error import drift_of_a_lap, plan_errors
+from planner.progress import ProgressCallback
 from planner.vehicle.vehicle import Switches, Vehicle, flips_after, roll_out
 from sim.mechanics import planar
 from sim.mechanics.planar import POSE

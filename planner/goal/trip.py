@@ -22,13 +22,13 @@ from common.errors import InputError
 from common.keywords import checks_keywords
 from planner.goal.last_dwells import Ending
 from planner.goal.route import COURSES, Lattices, NoWayError, RouteLimits, route
+from planner.guidance.line_of_sight import Start
 from planner.options import AnyVehicle, GoalOptions, Length, asked, place_of, pose_of, swimmer_of
 from planner.paths.dubins import DubinsPaths
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.tractrix import Drift, Reference
 from planner.paths.units import LONGEST, ask_about_days, heading_in_degrees, in_lab, place_in_lab
 from planner.planning.declare import FeasiblePath
-from planner.planning.line_of_sight import Start
 from planner.planning.picture import BODY, REPLAYED
 from planner.planning.plan import Job, Plan
 from planner.planning.solve import PathTask, Trial, solve

@@ -1,1 +1,1 @@
-"""The law of guidance, in loops that are compiled when a file of this folder changes."""
+"""When the motor flips: the law, in loops that are compiled when a file of this folder changes, and schedules."""

@@ -1,6 +1,6 @@
 """The law of guidance: when the motor flips next, from plain numbers.
 
-Its equations stand in `planner.planning.line_of_sight`. All functions are formulas: a plan follows a whole path
+Its equations stand in `planner.guidance.line_of_sight`. All functions are formulas: a plan follows a whole path
 in a compiled loop (`follow_some`), a tracker asks for one flip at a time in plain Python. The time of a flip is
 the root of one equation, which the secant method finds in about four evaluations. Their cost does not depend on
 the length of the path: the place on it is remembered, and moves forward.

@@ -26,8 +26,9 @@ from planner.paths.tractrix import Drift
 from planner.paths.units import check_size, describe, in_lab, in_tails
 from planner.planning.declare import Feasibility, FeasiblePath, make_feasible
 from planner.planning.plan import Plan
-from planner.planning.request import PlanRequest, ProgressCallback
+from planner.planning.request import PlanRequest
 from planner.planning.solve import PathTask, solve
+from planner.progress import ProgressCallback
 from planner.vehicle.tracked_point import TrackedVehicle
 
 

@@ -35,7 +35,7 @@ from planner.paths.tractrix import Drift
 from planner.paths.units import in_lab, place_in_lab
 from planner.planning.picture import REPLAYED, label_points
 from planner.planning.plan import Job, Plan
-from planner.planning.request import ProgressCallback
+from planner.progress import ProgressCallback
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

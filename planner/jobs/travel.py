@@ -23,8 +23,9 @@ from planner.paths.tractrix import Drift, Reference
 from planner.paths.units import check_size
 from planner.planning.declare import AS_DRAWN, FeasiblePath
 from planner.planning.plan import Plan
-from planner.planning.request import ORDERING, PlanRequest, ProgressCallback, tell
+from planner.planning.request import PlanRequest
 from planner.planning.solve import PathTask, Trial, solve
+from planner.progress import ORDERING, ProgressCallback, tell
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.zigzag import dwells_for
 

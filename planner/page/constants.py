@@ -37,7 +37,7 @@ _NAMES = {  # of each module; a leading underscore is left out
     "planner.planning.stated_error": "LEVEL WOBBLE DRAWS BLOCKS WITHIN KEPT ZIGZAG PLACE COURSE STRETCH WEYL "
     "FIRST SECOND MIDDLE TAIL",
     "planner.guidance.law": "EXACT LARGEST_STEP LARGEST_TURN TURNS MOST_BIAS HALVINGS MOST_LOOKS",
-    "planner.planning.line_of_sight": "MOST_SWITCHES PATIENCE EVERY QUICKEST TIGHTEST PAIRS_AHEAD",
+    "planner.guidance.line_of_sight": "MOST_SWITCHES PATIENCE EVERY QUICKEST TIGHTEST PAIRS_AHEAD",
     "planner.planning.plan": "WIDE OWN_TABLE_FROM",
     "planner.planning.solve": "WORTH SAVED LENGTHENED_FROM MORE GROWS MARGINS OTHERS",
     "planner.vehicle.from_table": "ODD TIME_STEPS STEP",

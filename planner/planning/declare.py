@@ -31,7 +31,8 @@ from planner.paths.path import Path2D, smoothed, steps_of
 from planner.paths.tractrix import Drift, Reference, closest, reference
 from planner.paths.units import LONGEST, Scales, extent, in_lab, place_in_lab
 from planner.planning.conditions import Detour
-from planner.planning.request import DECLARING, REMEDY, Corner, ProgressCallback, tell
+from planner.planning.request import Corner
+from planner.progress import DECLARING, REMEDY, ProgressCallback, tell
 from planner.vehicle.vehicle import Vehicle
 
 AS_DRAWN = 0.85  # share of the pivot's largest curvature up to which a path is followed as it was drawn

@@ -15,12 +15,12 @@ from common.arrays import Floats
 from common.errors import InputError
 from common.notebook import Shown, given_axes
 from common.units import format_time
+from planner.guidance.line_of_sight import Guidance
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.units import extent, heading_in_degrees, in_lab, place_in_lab, time_in_lab
 from planner.planning.conditions import KeptClear, Lap
 from planner.planning.declare import FeasiblePath
-from planner.planning.line_of_sight import Guidance
 from planner.planning.request import PlanRequest
 from planner.planning.stated_error import PlanErrors, feedback_error, plan_errors
 from planner.vehicle.measured import MeasuredVehicle

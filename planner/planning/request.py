@@ -1,4 +1,4 @@
-"""All that a user asks of a plan, besides path and robot; and what the plan tells while it is made.
+"""All that a user asks of a plan, besides path and robot.
 
 Lengths in l, times in μ0 l⁴/EI, angles in rad.
 """
@@ -6,7 +6,7 @@ Lengths in l, times in μ0 l⁴/EI, angles in rad.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -21,12 +21,6 @@ from sim.mechanics import planar
 from sim.mechanics.planar import POSE
 
 Corner = Literal["nearest", "minimax", "fillet", "error"]
-DECLARING = "finding the nearest path that can be followed"
-ORDERING = "comparing the ways between places"
-REMEDY = "too tight: looking for a change that helps"
-FOLLOWING = "following the path"
-ERRORS = "computing the error of the path"
-ProgressCallback = Callable[[float], object]  # called with a Progress
 _ANYWHERE = (5.0, 5.0, 2.0)  # standard deviations of wrong poses
 
 
@@ -121,18 +115,3 @@ class PlanRequest:
         if not (math.isfinite(seconds) and seconds > 0):
             raise InputError(f"minimum dwell {seconds:g} s; give a number above 0")
         return max(seconds / robot.time_scale, QUICK if dwell is None else dwell)
-
-
-class Progress(float):
-    """The share of the path that has been followed, with the stage of the plan and the share of the stage."""
-
-    stage: str
-    done: float
-
-
-def tell(progress: ProgressCallback | None, stage: str, done: float) -> None:
-    """Tell how far a stage is."""
-    if progress is not None:
-        share = Progress(done if stage == FOLLOWING else float(stage == ERRORS))
-        share.stage, share.done = stage, done
-        progress(share)

@@ -22,16 +22,17 @@ from typing import NamedTuple
 import numpy as np
 
 from common.errors import InputError
+from planner.guidance.line_of_sight import Guidance, Start, follow, guaranteed, look_ahead
 from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift
 from planner.paths.units import in_lab, time_in_lab
 from planner.planning.conditions import BlockedError, KeptClear
 from planner.planning.declare import FeasiblePath
-from planner.planning.line_of_sight import Guidance, Start, follow, guaranteed, look_ahead
 from planner.planning.plan import Plan
-from planner.planning.request import PlanRequest, ProgressCallback
+from planner.planning.request import PlanRequest
 from planner.planning.stated_error import plan_errors
+from planner.progress import ProgressCallback
 from planner.vehicle.from_table import OWN_TABLE
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.vehicle import Switches

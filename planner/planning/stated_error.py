@@ -46,7 +46,8 @@ from planner.paths.distance import distance_to, nearest
 from planner.paths.path import Path2D
 from planner.paths.units import Scales
 from planner.planning.declare import FeasiblePath
-from planner.planning.request import ERRORS, Camera, ProgressCallback, tell
+from planner.planning.request import Camera
+from planner.progress import ERRORS, ProgressCallback, tell
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.vehicle import Mode, Rollout, Switches, Vehicle, interpolated, roll_out
 from sim.mechanics import planar

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from common.arrays import Floats
-from planner.planning.line_of_sight import Guidance
+from planner.guidance.line_of_sight import Guidance
 from planner.planning.request import Camera
 from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Vehicle
 from sim.mechanics import planar

@@ -15,8 +15,8 @@ from planner.jobs.tour import tour
 from planner.jobs.travel import Travel
 from planner.paths.distance import distance_to
 from planner.paths.obstacles import Circle, FreeSpace
-from planner.planning.request import ORDERING
 from planner.planning.solve import Trial
+from planner.progress import ORDERING
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.zigzag import dwells_for
 from sim.motion.replay import replay

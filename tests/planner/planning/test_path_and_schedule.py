@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 
 from common.errors import InputError
+from planner.guidance.line_of_sight import follow, guaranteed, hysteresis, look_ahead
 from planner.jobs.plan import plan
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon, smoothed
 from planner.paths.tractrix import STILL, Drift, reference
 from planner.planning.declare import MOST_WORK, Feasibility, changed, cost, feasible, make_feasible, remedy
-from planner.planning.line_of_sight import follow, guaranteed, hysteresis, look_ahead
-from planner.planning.request import DECLARING, REMEDY, Corner, Progress
+from planner.planning.request import Corner
+from planner.progress import DECLARING, REMEDY, Progress
 from planner.vehicle.vehicle import roll_out
 from sim.mechanics import planar
 from sim.model.presets import PRESETS

@@ -15,14 +15,16 @@ import pytest
 from common.errors import InputError, InputWarning
 from planner.files.headers import schedule_header
 from planner.goal.trip import to_goal
+from planner.guidance import line_of_sight
 from planner.jobs.plan import plan
 from planner.options import PathOptions
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon
 from planner.paths.units import in_lab
-from planner.planning import line_of_sight, solve
+from planner.planning import solve
 from planner.planning.conditions import BlockedError
-from planner.planning.request import ERRORS, PlanRequest
+from planner.planning.request import PlanRequest
+from planner.progress import ERRORS
 from planner.vehicle.from_table import table_vehicle
 from planner.vehicle.tracked_point import tracked_vehicle
 from planner.vehicle.vehicle import roll_out

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from common.errors import InputError
+from planner.guidance.line_of_sight import follow, look_ahead
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle
 from planner.paths.tractrix import Reference, reference
-from planner.planning.line_of_sight import follow, look_ahead
 from planner.planning.request import Camera
 from planner.planning.stated_error import (
     WOBBLE,

@@ -50,7 +50,7 @@ from planner.guidance.law import (
     pose_after,
 )
 from planner.paths.tractrix import Reference
-from planner.planning.request import FOLLOWING, ProgressCallback, tell
+from planner.progress import FOLLOWING, ProgressCallback, tell
 from planner.vehicle.vehicle import BEFORE_KNOTS, SHORTEST, STEP, Switches, Vehicle
 from planner.vehicle.zigzag import Zigzag, zigzag
 from sim.mechanics import planar
