@@ -18,7 +18,7 @@ from sim.mechanics import planar
 from sim.mechanics.geometry import straight
 from sim.model.body import PLACES
 from sim.model.groups import Groups
-from sim.model.response import BEFORE, DWELLS, FORGOTTEN, SETTLED, Responses
+from sim.model.response import BEFORE, DWELLS, SETTLED, Responses
 from sim.motion.steady import steady
 from sim.motion.steady_motion import Steady, net_speeds, twists
 from sim.motion.stepped_response import Curves, stepped_response
@@ -26,16 +26,13 @@ from sim.solve.assembly import bodies, numbers
 from sim.solve.grouping import slices
 from sim.solve.march import REVERSED
 from sim.solve.refinement import OnMesh, coarse_orbits, orbits_on_mesh
-from sim.solve.transient import NO_MARKS, Flip, follow_flips
+from sim.solve.transient import Flip, follow_flips
 
 _SAME = 1.2  # time units from which the memory is constant
 MESHES = (6, 9)  # edges
 TOLERANCE = 1e-3  # of a time step, in l: see `sim.solve.transient`
 _LEAST_INSTANTS = {1: 3, 2: 3}  # by N; with more tails the phase at the flip hardly matters
 _OFFSET = 1  # of a robot's numbers
-_MEMORY_EDGES, _MEMORY_TOLERANCE = 6, 4e-4  # mesh of `longer_memory`, and of a time step, in l
-_MEMORY_UNTIL = float(BEFORE[-1])  # from here on the difference is constant
-_SOME_BEFORE = BEFORE[::2].copy()  # dwells before that are simulated
 _TIMES = np.unique([*np.minimum(DWELLS, SETTLED), *np.minimum(DWELLS, _SAME)])
 _UNTIL_SETTLED, _UNTIL_SAME = (np.searchsorted(_TIMES, np.minimum(DWELLS, end)) for end in (SETTLED, _SAME))
 
@@ -247,62 +244,3 @@ def _extrapolated(
 def mirrored(x: Floats) -> Floats:
     """Mirror a robot's shape (n, M, 3), as a reversed motor does."""
     return np.ascontiguousarray(x[:, -np.arange(x.shape[1])] * np.array([1.0, -1.0, 1.0]))
-
-
-@np.errstate(all="ignore")  # robots that overflow give NaN
-def longer_memory(groups: Groups) -> Floats:
-    """Simulate what a response owes to the last dwell but one, (B, K, D, 3) after BEFORE; NaN where unknown.
-
-    The curves say how a robot responds after a dwell S that follows a long one. Here S follows another dwell of S:
-
-        longer(T | S) = lag(T | S, S) − lag(T | S)
-
-    It decays with 2 S: at S = 0.3 it is up to 4·10⁻³ of speed and yaw rate, at 0.6 up to 10⁻³, at 1 below 10⁻⁵. It
-    is meant as an error of the curves, so one coarse mesh is enough.
-    """
-    found = _at_some_dwells(groups)
-    knots, places = np.log(np.append(_SOME_BEFORE, FORGOTTEN)), np.log(BEFORE)
-    known = np.concatenate([found, np.zeros_like(found[:, :1])], 1)
-    k = np.clip(np.searchsorted(knots, places, side="right") - 1, 0, len(knots) - 2)
-    share = ((places - knots[k]) / (knots[k + 1] - knots[k]))[:, None, None]
-    return np.asarray((1 - share) * known[:, k] + share * known[:, k + 1])
-
-
-def _at_some_dwells(groups: Groups) -> Floats:
-    """Simulate the difference after two dwells of _SOME_BEFORE, (B, K, D, 3), seen as for a positive motor."""
-    rows, reverse_rows, count = numbers(groups), numbers(groups.reversed()), len(_SOME_BEFORE)
-    dwells = np.minimum(DWELLS, _MEMORY_UNTIL)
-    forth = orbits_with_phases(rows, groups.N, [_MEMORY_EDGES])[0]
-    instants = [len(orbit.u) if orbit else 1 for orbit in forth]
-    back = orbits_with_phases(reverse_rows, groups.N, [_MEMORY_EDGES], [instants])[0]
-    orbits = [(f, b) for f, b in zip(forth, back, strict=True) if f and b]
-    solved = np.array([bool(f and b) for f, b in zip(forth, back, strict=True)])
-    there = [_flipped(row, f, b) for row, (f, b) in zip(rows[solved], orbits, strict=True)]
-    and_back = [_flipped(row, b, f) for row, (f, b) in zip(reverse_rows[solved], orbits, strict=True)]
-    # A dwell after a long one in each direction; then the same dwell once more after the first.
-    first = follow_flips(there, NO_MARKS, _MEMORY_TOLERANCE, _SOME_BEFORE)
-    once = follow_flips(and_back, NO_MARKS, _MEMORY_TOLERANCE, _SOME_BEFORE)
-    second = [
-        course and flip._replace(x=course.shapes[k], u=b.u, until=dwell)
-        for flip, course, (_, b) in zip(and_back, first, orbits, strict=True)
-        for k, dwell in enumerate(_SOME_BEFORE.tolist())
-    ]
-    twice = follow_flips(second, NO_MARKS, _MEMORY_TOLERANCE)
-    # The last flips: after two dwells, and after one, whose lags differ by what is sought.
-    last: list[Flip | None] = []
-    for i, (flip, course, (f, _)) in enumerate(zip(there, once, orbits, strict=True)):
-        for k, two in enumerate(twice[i * count : (i + 1) * count]):
-            ends = (two.end, course.shapes[k]) if course and two else (None, None)
-            last += [flip._replace(x=x, u=f.u) if x is not None else None for x in ends]
-    unknown = np.full((len(dwells), 3), np.nan)
-    lags = [course.lag.mean(1) if course else unknown for course in follow_flips(last, dwells, _MEMORY_TOLERANCE)]
-    after_two, after_one = np.moveaxis(np.reshape(lags, (len(orbits), count, 2, len(dwells), 3)), 2, 0)
-    mirror = np.where(rows[solved, :1] < 0, planar.MIRROR, np.ones(3))
-    differences = np.full((len(rows), count, len(dwells), 3), np.nan)
-    differences[solved] = (after_two - after_one) * mirror[:, None, None]
-    return differences
-
-
-def _flipped(row: Floats, after: OnMesh, before: OnMesh) -> Flip:
-    """Flip the motor of a robot in the steady motion `before`; its numbers afterwards are `row`."""
-    return Flip(row, before.x, before.u * REVERSED, after.twist, _MEMORY_UNTIL)

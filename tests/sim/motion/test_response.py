@@ -8,14 +8,13 @@ import pytest
 from common.errors import InputError
 from sim.mechanics import planar
 from sim.model.groups import Groups
-from sim.model.response import BEFORE, DWELLS, FORGOTTEN, Responses, at_equal_dwells, memory_after
+from sim.model.response import BEFORE, DWELLS, FORGOTTEN, Responses, memory_after
 from sim.model.schedule import Schedule
 from sim.motion import response
 from sim.motion.replay import replay, replay_error
-from sim.motion.response import longer_memory, responses
+from sim.motion.response import responses
 from sim.motion.run import Resolution
 from sim.motion.steady import steady
-from sim.motion.steady_motion import twists
 from sim.motion.stepped_response import stepped_response
 from sim.solve.assembly import bodies
 from tests.oracles.switching import switch_response
@@ -188,28 +187,3 @@ def test_a_flip_leaves_little_error_of_the_step(dwell: float) -> None:
         for steps in (24, 24 * 16)
     )
     assert default == pytest.approx(fine, rel=4e-3)
-
-
-def test_with_it_the_net_speed_of_short_dwells_is_that_of_flips_that_go_on() -> None:
-    """At dwells of 0.3 and 0.4 it explains most of what the curves, which know one dwell before, leave."""
-    few = np.array([3, 5])
-    groups = control(omega_bar=12.0, N=4.0)
-    both = control(2, omega_bar=12.0, N=4.0)
-    stepped = switch_response(both, DWELLS[few], resolution=Resolution(24, 72)).net_speed
-    motion, curves = steady(groups), responses(groups)
-    twist = twists(motion.v_z, motion.v_x, motion.omega_yr, np.ones(1))
-    longer = curves.memory + longer_memory(groups)
-    lags = [curves.lag + at_equal_dwells(memory) for memory in (curves.memory, longer)]
-    off = [abs(planar.net_speed(twist[:, None], lag, DWELLS)[0, few] - stepped) for lag in lags]
-    assert (off[1] < 0.4 * off[0]).all()
-
-
-@pytest.mark.parametrize("changes", [{}, {"left_right_bias": 0.2}])
-def test_it_fades(changes: dict[str, float]) -> None:
-    found = np.abs(longer_memory(control(omega_bar=20.0, **changes))[0]).max((1, 2))
-    assert found[BEFORE > 1.0].max() < 0.02 * found[0]
-
-
-def test_a_reversed_motor_gives_the_same() -> None:
-    there, back = (longer_memory(control(omega_bar=w, end_over_end_drag=3.0)) for w in (12.0, -12.0))
-    assert there == pytest.approx(back, abs=1e-6)
