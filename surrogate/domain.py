@@ -92,7 +92,7 @@ class Support:
         It is q over its limit. Outside the range of an input, by more than a hundredth of its width, it is the
         distance from the middle of the range over half its width, if that is larger.
         """
-        return novelty_of(*self.numbers, np.ascontiguousarray(inputs, dtype=float))
+        return novelty_of(self.numbers, np.ascontiguousarray(inputs, dtype=float))
 
     @cached_property
     def numbers(self) -> SupportNumbers:
@@ -155,12 +155,12 @@ def put_novelty(support: SupportNumbers, inputs: Floats, novelty: Floats) -> Non
 
 
 @compiled_fast
-def novelty_of(shift: Floats, scale: Floats, inverse: Floats, products: Integers, inputs: Floats) -> Floats:
+def novelty_of(support: SupportNumbers, inputs: Floats) -> Floats:
     """Return `Support.novelty` at inputs (M, F), (M,)."""
     novelty = np.empty(len(inputs))
     for begin in range(0, len(inputs), BLOCK):
         end = begin + BLOCK
-        put_novelty(SupportNumbers(shift, scale, inverse, products), inputs[begin:end], novelty[begin:end])
+        put_novelty(support, inputs[begin:end], novelty[begin:end])
     return novelty
 
 

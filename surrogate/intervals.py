@@ -174,15 +174,15 @@ def _conformal_quantile(scores: Floats) -> float:
 @compiled_fast
 def _put_design(features: Floats, shift: Floats, scale: Floats, x: Floats, design: Floats) -> None:
     """Write 1, x and all products of two, (P,), for features as x (F,), held to five standard deviations."""
-    count, place = len(x), 1 + len(x)
+    count, index = len(x), 1 + len(x)
     design[0] = 1.0
     for i in range(count):
         x[i] = min(max((features[i] - shift[i]) / scale[i], -_CLIPPED), _CLIPPED)
         design[1 + i] = x[i]
     for i in range(count):
         for j in range(i, count):
-            design[place] = x[i] * x[j]
-            place += 1
+            design[index] = x[i] * x[j]
+            index += 1
 
 
 @compiled_fast

@@ -66,18 +66,15 @@ def rows_by_network(kind: Integers) -> Iterator[tuple[int, Integers | slice]]:
 
 @compiled_fast
 def motions_of(
-    w0: Floats, w1: Floats, w2: Floats, w3: Floats, w4: Floats, w5: Floats, g0: Floats, g1: Floats, g2: Floats,
-    g3: Floats, g4: Floats, g5: Floats, shift: Floats, scale: Floats, inverse: Floats, products: Integers,
-    limits: Floats, groups: Floats, robots: Floats,
+    network: Layers, gap: Layers, support: SupportNumbers, limits: Floats, groups: Floats, robots: Floats,
 ) -> tuple[Floats, Floats, Floats, Integers, Floats]:  # fmt: skip
     """Solve for the motions of robots whose tails have one network.
 
     Not np.isfinite: it asks whether x − x = 0, which is always so where sums may be reordered.
 
     Args:
-        w0 to w5: `Layers` of the tails' wrench.
-        g0 to g5: those of the gap.
-        shift, scale, inverse, products: `SupportNumbers`.
+        network, gap: of the tails' wrench and of the gap.
+        support: where the network has learned.
         limits, groups: least and greatest size of each of `surrogate.domain.ROBOT` (2, 9), and the robots'
             (M, 9).
         robots: packed.
@@ -86,12 +83,10 @@ def motions_of(
         Motions (M, 5), `surrogate.tails.INPUTS` (M, 7), what widths depend on (M, 11) without a spread of
         members, why a robot is outside, one of `surrogate.domain` (M,), and outputs, NaN of a flip.
     """
-    network, gap = Layers(w0, w1, w2, w3, w4, w5), Layers(g0, g1, g2, g3, g4, g5)
-    support, count = SupportNumbers(shift, scale, inverse, products), len(robots)
-    motion, found = solve(network, robots)
+    count, (motion, found) = len(robots), solve(network, robots)
     inputs, outputs = np.empty((count, _INPUTS)), np.full((_OUTPUTS, count), np.nan)
     features, outside = np.empty((count, FEATURES)), np.empty(count, dtype=np.int64)
-    own, of_gap, share = np.empty((BLOCK, len(shift))), np.empty((BLOCK, 8)), np.empty((BLOCK, 2))
+    own, of_gap, share = np.empty((BLOCK, len(support.shift))), np.empty((BLOCK, 8)), np.empty((BLOCK, 2))
     novelty = np.empty(BLOCK)
     for begin in range(0, count, BLOCK):
         end = min(begin + BLOCK, count)
@@ -110,10 +105,12 @@ def motions_of(
             features[row, SPREAD + 1], features[row, SPREAD + 2] = of_gap[k, 7], 1.0 if of_gap[k, 7] == 0 else 0.0
             for i in range(FEATURES):
                 value = features[row, i]
+                # Widths are sums of products: an infinite feature would make them NaN even where its weight is 0.
                 features[row, i] = 0.0 if np.isnan(value) else min(max(value, -1e300), 1e300)
             within = found[row]
             for i in range(groups.shape[1]):
                 within = within and limits[0, i] <= abs(groups[row, i]) <= limits[1, i]
+            # The last reason counts: outside the learned motions, speeds mean nothing.
             fast = abs(motion[row, 2]) > MAX_YAW_SHARE * abs(motion[row, 4])
             outside[row] = FAST_YAW if fast else INSIDE
             if not within:

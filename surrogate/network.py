@@ -81,7 +81,7 @@ class Ensemble:
 
     def __call__(self, inputs: Floats) -> Floats:
         """Return the mean of the members, (M, O)."""
-        y = evaluate_all(*self.layers, np.ascontiguousarray(inputs, dtype=float))
+        y = evaluate_all(self.layers, np.ascontiguousarray(inputs, dtype=float))
         return y[:, : self.shape["outputs"]]
 
     @cached_property
@@ -205,11 +205,9 @@ def evaluate(layers: Layers, x: Floats, y: Floats) -> None:
 
 
 @compiled_fast
-def evaluate_all(
-    shift: Floats, first: Floats, hidden: Floats, last: Floats, biases: Floats, rest: Floats, x: Floats
-) -> Floats:
-    """Return the mean of the members of `Layers`, (M, O) with the padding, at inputs x (M, F)."""
-    layers, y = Layers(shift, first, hidden, last, biases, rest), np.empty((len(x), rest.shape[1]))
+def evaluate_all(layers: Layers, x: Floats) -> Floats:
+    """Return the mean of the members, (M, O) with the padding, at inputs x (M, F)."""
+    y = np.empty((len(x), layers.rest.shape[1]))
     for begin in range(0, len(x), BLOCK):
         evaluate(layers, x[begin : begin + BLOCK], y[begin : begin + BLOCK])
     return y

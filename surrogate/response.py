@@ -81,7 +81,7 @@ class ResponseTable:
     def put_flips(self, motions: Motions, dwells: Floats) -> None:
         """Write the response at equal dwells (M,) into the outputs of motions; NaN where none was learned."""
         lag, memory = self.networks[:2]
-        numbers = (*lag.layers, *memory.layers, *self.equal_dwells, lag.shape["outputs"], _KNOTS)
+        numbers = (lag.layers, memory.layers, *self.equal_dwells, lag.shape["outputs"], _KNOTS)
         own = (motions.robots, motions.motion, motions.inputs)
         write_flips(*numbers, *own, np.ascontiguousarray(dwells, dtype=float), motions.outside, motions.outputs)
 
@@ -108,8 +108,8 @@ def _put_flip_inputs(robot: Floats, motion: Floats, inputs: Floats, x: Floats, s
     """Write the inputs of the networks of a flip (15,), and what their curves are multiplied by (3,)."""
     head, number = robot[PLACES.head], robot[PLACES.number]
     x[:_INPUTS] = inputs
-    for i, place in enumerate(OF_HEAD):
-        x[_INPUTS + i] = head[place]
+    for i, index in enumerate(OF_HEAD):
+        x[_INPUTS + i] = head[index]
     x[FLIP_INPUTS - 2], x[FLIP_INPUTS - 1] = np.log(number), 1.0 if number == 2 else 0.0
     sway = motion[0] + motion[2] * robot[PLACES.head_length] / 2
     speeds[0], speeds[1], speeds[2] = np.hypot(motion[1], SMALL_SURGE * sway), sway, motion[2]
@@ -132,16 +132,15 @@ def flip_inputs(robots: Floats, motion: Floats, inputs: Floats) -> tuple[Floats,
 
 @compiled_fast
 def write_flips(
-    l0: Floats, l1: Floats, l2: Floats, l3: Floats, l4: Floats, l5: Floats, m0: Floats, m1: Floats, m2: Floats,
-    m3: Floats, m4: Floats, m5: Floats, mean: Floats, vectors: Floats, components: int, knots: Floats,
-    robots: Floats, motion: Floats, inputs: Floats, dwells: Floats, outside: Integers, outputs: Floats,
+    lag: Layers, memory: Layers, mean: Floats, vectors: Floats, components: int, knots: Floats, robots: Floats,
+    motion: Floats, inputs: Floats, dwells: Floats, outside: Integers, outputs: Floats,
 ) -> None:  # fmt: skip
     """Write the response to flips with equal dwells, and mark robots whose response was not learned.
 
     A lag between the dwells of its curve is cubic in ln T̄ through four knots, and constant after the last one.
 
     Args:
-        l0 to l5, m0 to m5: `Layers` of the lag and of the memory.
+        lag, memory: networks of the lag and of the memory.
         mean, vectors: of lag and memory at equal dwells, (D 3,) and (C, D 3).
         components: number of vectors of the lag, which come first.
         knots: ln T̄ of the curves, (D,).
@@ -149,7 +148,6 @@ def write_flips(
         dwells: (M,).
         outside, outputs: written to.
     """
-    lag, memory = Layers(l0, l1, l2, l3, l4, l5), Layers(m0, m1, m2, m3, m4, m5)
     x, of_lag = np.empty((BLOCK, FLIP_INPUTS)), np.empty((BLOCK, lag.rest.shape[1]))
     speeds, of_memory, near = np.empty((BLOCK, 3)), np.empty((BLOCK, memory.rest.shape[1])), np.empty(12)
     own = np.empty(3)
@@ -163,6 +161,7 @@ def write_flips(
             row = begin + k
             place = min(np.log(dwells[row]), knots[-1])
             first = min(max(np.searchsorted(knots, place) - 2, 0), len(knots) - 4)
+            # Only the four knots about the dwell are needed of a curve: 12 numbers of 75.
             near[:] = mean[3 * first : 3 * first + 12]
             for c in range(len(vectors)):
                 size = of_lag[k, c] if c < components else of_memory[k, c - components]

@@ -280,8 +280,8 @@ class NeuralTable(Shown):
                 unknown, none = np.full(len(own), NOT_LEARNED), np.full((len(own), 12), np.nan)
                 parts.append((rows, none[:, :5], none[:, :7], 0 * own[:, :11], unknown, none.T))
             else:
-                numbers = (*network.layers, *self.tails.gap.layers, *support.numbers, self._limits)
-                parts.append((rows, *motions_of(*numbers, groups[rows], own)))
+                layers = network.layers, self.tails.gap.layers
+                parts.append((rows, *motions_of(*layers, support.numbers, self._limits, groups[rows], own)))
         return Motions(robots, *(parts[0][1:] if len(parts) == 1 else _joined(parts)))
 
     @cached_property

@@ -113,7 +113,7 @@ def pack_robots(robots: RobotColumns) -> Floats:
 def unpack_robots(packed: Floats) -> RobotColumns:
     """Return packed robots (M, ROBOT_NUMBERS) by field, without copying them."""
     parts = zip(_SHAPES, PLACES, strict=True)
-    return RobotColumns._make(packed[:, place].reshape(len(packed), *shape) for shape, place in parts)
+    return RobotColumns._make(packed[:, columns].reshape(len(packed), *shape) for shape, columns in parts)
 
 
 def packed_robots(columns: Mapping[str, Floats]) -> tuple[Floats, Floats]:
