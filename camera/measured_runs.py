@@ -138,6 +138,7 @@ def _measured(samples: pd.DataFrame, table: pd.DataFrame, y_down: bool, robot: R
             continue
         time, x, y, heading = (track[c].to_numpy(dtype=float) for c in COLUMNS[1:])
         _check_radians(run, x, y, heading)
+        # A picture's y points down: mirrored, a left turn is a left turn again.
         side = -1.0 if y_down else 1.0
         fit = _fitted(time, x, side * y, side * heading)
         if fit is None:
@@ -156,6 +157,7 @@ def _measured(samples: pd.DataFrame, table: pd.DataFrame, y_down: bool, robot: R
     known = [c for c in columns if columns[c].notna().any()]
     if not known:
         raise InputError(f"no track gives a number{f' ({aside[0]})' if aside else ''}; check the tracks")
+    # Checks need all runs: one wrong sense may be an error of the table, many are one of the camera.
     _check_senses(table, columns, y_down)
     if robot is not None:
         _check_motion(robot, table, columns)

@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 
 from camera.track_options import TrackOptions
-from camera.tracking_programs import PROGRAMS, Seen, TrackingProgram
+from camera.tracking_programs import PROGRAMS, TrackedPoints, TrackingProgram
 from common.errors import InputError, naming
 from common.reading import read_bytes
 from common.tables import read_table
@@ -82,7 +82,7 @@ def _films(folder: Path, program: TrackingProgram) -> list[Path]:
     return list(films.values())
 
 
-def _poses(seen: Seen, path: Path, program: TrackingProgram, options: TrackOptions) -> pd.DataFrame:
+def _poses(seen: TrackedPoints, path: Path, program: TrackingProgram, options: TrackOptions) -> pd.DataFrame:
     """Make poses of the points of a file."""
     if faults := _missing(seen, options):
         raise InputError(f"{path} {', and it '.join(faults)}")
@@ -122,7 +122,7 @@ def _also_missing(path: Path, programs: list[str]) -> str:
     return ""
 
 
-def _scales(seen: Seen, options: TrackOptions) -> tuple[float, float]:
+def _scales(seen: TrackedPoints, options: TrackOptions) -> tuple[float, float]:
     """Return the units of a file's times [s] and lengths [m]: its own ones, or those of the options; or nan."""
     fps, (scale, unit) = options.get("fps"), number_and_unit(options.get("scale") or "", of_kind("length"))
     seconds = seen.seconds if seen.seconds is not None else 1 / fps if fps else math.nan
@@ -130,14 +130,14 @@ def _scales(seen: Seen, options: TrackOptions) -> tuple[float, float]:
     return seconds, metres
 
 
-def _two(seen: Seen, options: TrackOptions) -> tuple[str, str] | None:
+def _two(seen: TrackedPoints, options: TrackOptions) -> tuple[str, str] | None:
     """Name the points ahead and behind; None: the file has headings."""
     if "heading" in seen.points and not {"front", "rear"} & set(options):
         return None
     return options.get("front", "front"), options.get("rear", "rear")
 
 
-def _missing(seen: Seen, options: TrackOptions) -> list[str]:
+def _missing(seen: TrackedPoints, options: TrackOptions) -> list[str]:
     """List what is missing or impossible, or is given though the file has its own, all at once."""
     (seconds, metres), scale = _scales(seen, options), options.get("scale")
     faults = [

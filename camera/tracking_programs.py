@@ -32,7 +32,7 @@ _NUMBERS = r"(?:[-+.\de]+[ \t]+){7}[-+.\de]+"  # time, place and quaternion, in 
 _NO_NAMES = r"(?![ \t]*(?:\S+[ \t]+){7}\S+[ \t]*\r?\n)"  # eight words above them are names of a table
 
 
-class Seen(NamedTuple):
+class TrackedPoints(NamedTuple):
     """The points of one file: robot, point, time, x, y, `sure` (a likelihood), and the heading of a rigid body."""
 
     points: pd.DataFrame
@@ -44,7 +44,7 @@ class TrackingProgram(NamedTuple):
     """A program that tracks."""
 
     title: str
-    read: Callable[[Path], Seen]
+    read: Callable[[Path], TrackedPoints]
     endings: tuple[str, ...]  # of its files; of one film the first is read
     begins: str  # how they begin, in Latin-1: a pattern
     y_down: bool = True  # as in pictures
@@ -128,7 +128,7 @@ def _unit(words: str, kind: str) -> float | None:
     return to_si(1.0, unit.suffix) if unit is not None and unit.kind == kind else None
 
 
-def _deeplabcut(path: Path) -> Seen:
+def _deeplabcut(path: Path) -> TrackedPoints:
     """Read the table of a film: scorer, perhaps individuals, bodyparts and coords stand above its columns."""
     if _is_hdf5(path):
         with _hdf5(path) as file:
@@ -145,7 +145,7 @@ def _deeplabcut(path: Path) -> Seen:
         names = [list(name) for name in written.columns]
     columns = {tuple(name): values[:, k] for k, name in enumerate(names)}
     parts = dict.fromkeys(name[:-1] for name in columns)
-    return Seen(
+    return TrackedPoints(
         pd.concat(
             _points(part[-2] if len(part) > 2 else "", part[-1], frames, columns[*part, "x"], columns[*part, "y"],
                     sure=columns.get((*part, "likelihood"), 1.0))
@@ -154,7 +154,7 @@ def _deeplabcut(path: Path) -> Seen:
     )  # fmt: skip
 
 
-def _sleap(path: Path) -> Seen:
+def _sleap(path: Path) -> TrackedPoints:
     """Read an "analysis" export."""
     if _is_hdf5(path):
         with _hdf5(path) as file:
@@ -165,7 +165,7 @@ def _sleap(path: Path) -> Seen:
                 for kind in ("node", "track")
             )
         frames = np.arange(tracks.shape[-1])
-        return Seen(
+        return TrackedPoints(
             pd.concat(
                 _points(robot, node, frames, tracks[i, 0, k], tracks[i, 1, k], scores[i, k])
                 for i, robot in enumerate(robots or [""])
@@ -180,17 +180,19 @@ def _sleap(path: Path) -> Seen:
         for node in nodes
     ]  # fmt: skip
     robot_of = table["track"].fillna("").astype(str).to_numpy()
-    return Seen(pd.concat(rows.assign(robot=robot_of) for rows in seen))
+    return TrackedPoints(pd.concat(rows.assign(robot=robot_of) for rows in seen))
 
 
-def _trackmate(path: Path) -> Seen:
+def _trackmate(path: Path) -> TrackedPoints:
     """Read the table of spots, TrackMate's own file (XML), or its export of tracks (XML); a track is a point."""
     rows, length, time = _trackmate_xml(path) if path.suffix.lower() == ".xml" else _trackmate_csv(path)
     spots = rows[_SPOT].apply(pd.to_numeric, errors="coerce").dropna(subset="TRACK_ID").astype({"TRACK_ID": int})
     seconds = _unit(time, "time")
     when = spots["FRAME" if seconds is None else "POSITION_T"]
     seen = _points("", "", when, spots["POSITION_X"], spots["POSITION_Y"])
-    return Seen(seen.assign(point=spots["TRACK_ID"].astype(str).to_numpy()), _unit(length, "length"), seconds)
+    return TrackedPoints(
+        seen.assign(point=spots["TRACK_ID"].astype(str).to_numpy()), _unit(length, "length"), seconds
+    )
 
 
 def _trackmate_csv(path: Path) -> tuple[pd.DataFrame, str, str]:
@@ -223,7 +225,7 @@ def _trackmate_xml(path: Path) -> tuple[pd.DataFrame, str, str]:
     return pd.DataFrame(rows, columns=_SPOT), model.get("spatialunits", ""), model.get("timeunits", "")
 
 
-def _tracker(path: Path) -> Seen:
+def _tracker(path: Path) -> TrackedPoints:
     """Read exported text: names of point masses above the names of their columns, of which x and y are read."""
     lines = [line for line in _text(path).splitlines() if line.strip()]
     mark = max("\t,; ", key=lambda mark: max(line.count(mark) for line in lines[:3]))
@@ -239,14 +241,14 @@ def _tracker(path: Path) -> Seen:
             places.setdefault(mass, {})[name.quantity] = values[k]
     unit = next(name.unit for name in names if name.quantity == "x")
     seen = pd.concat(_points("", mass, values[0], at["x"], at["y"]) for mass, at in places.items())
-    return Seen(seen, None if unit is None else to_si(1.0, unit.suffix), 1.0)
+    return TrackedPoints(seen, None if unit is None else to_si(1.0, unit.suffix), 1.0)
 
 
 def _numbers(words: pd.Series) -> pd.Series:
     return pd.to_numeric(words.str.replace(",", "."), errors="coerce")
 
 
-def _idtrackerai(path: Path) -> Seen:
+def _idtrackerai(path: Path) -> TrackedPoints:
     """Read trajectories; an individual is a point."""
     if path.suffix.lower() == ".npy":
         raise InputError("it is a pickle, which is not read; export CSV or HDF5 from idtracker.ai")
@@ -259,10 +261,12 @@ def _idtrackerai(path: Path) -> Seen:
         table = _csv(path).astype(float).to_numpy()
         time, places, names, seconds = table[:, 0], table[:, 1:].reshape(len(table), -1, 2), None, 1.0
     names = range(1, places.shape[1] + 1) if names is None else names
-    return Seen(pd.concat(_points("", name, time, *places[:, k].T) for k, name in enumerate(names)), None, seconds)
+    return TrackedPoints(
+        pd.concat(_points("", name, time, *places[:, k].T) for k, name in enumerate(names)), None, seconds
+    )
 
 
-def _motive(path: Path) -> Seen:
+def _motive(path: Path) -> TrackedPoints:
     """Read the CSV that is exported with y upwards: seen from above, x points to the right and z downwards."""
     rows = [row for row in csv.reader(io.StringIO(_text(path))) if any(row)]
     about = dict(zip(rows[0][::2], rows[0][1::2], strict=False))
@@ -281,15 +285,15 @@ def _motive(path: Path) -> Seen:
         a, b, c, w = (columns[kind, name, "Rotation", axis] for axis in "XYZW")
         heading = np.arctan2(2 * (w * b - a * c), 1 - 2 * (b * b + c * c))  # of the body's x axis
         seen.append(_points(name, name, values[:, 1], x, z, heading=heading))
-    return Seen(pd.concat(seen), _unit(about["Length Units"], "length"), 1.0)
+    return TrackedPoints(pd.concat(seen), _unit(about["Length Units"], "length"), 1.0)
 
 
-def _tum(path: Path) -> Seen:
+def _tum(path: Path) -> TrackedPoints:
     """Read time, place and quaternion, in s and m, as SLAM writes them."""
     table = _csv(path, sep=r"\s+", comment="#", header=None).to_numpy(dtype=float)
     time, x, y, _, a, b, c, w = table.T
     heading = np.arctan2(2 * (w * c + a * b), 1 - 2 * (b * b + c * c))  # of the body's x axis
-    return Seen(_points("robot", "robot", time - time.min(), x, y, heading=heading), 1.0, 1.0)
+    return TrackedPoints(_points("robot", "robot", time - time.min(), x, y, heading=heading), 1.0, 1.0)
 
 
 PROGRAMS = {

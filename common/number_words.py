@@ -124,11 +124,11 @@ def plain_numbers(lines: Sequence[str], separator: str, width: int) -> list[np.n
     return [_whole(column, rows, separator, k) for k, column in enumerate(values.T)]
 
 
-def _whole(values: np.ndarray, rows: Sequence[str], separator: str, place: int) -> np.ndarray:
+def _whole(values: np.ndarray, rows: Sequence[str], separator: str, index: int) -> np.ndarray:
     """Convert a column to integers if they are written so."""
     if np.abs(values).max() >= 2.0**53 or np.any(values % 1):
         return values
-    written = "".join(row.split(separator, place + 1)[place] for row in rows)
+    written = "".join(row.split(separator, index + 1)[index] for row in rows)
     return values if set(written) & set(".eE") else values.astype(np.int64)
 
 

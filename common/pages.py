@@ -156,9 +156,9 @@ def _table(header: Sequence[Markup], rows: Sequence[Sequence[Markup]]) -> Markup
 def _row_width(header: Sequence[Markup], rows: Sequence[Sequence[Markup]]) -> int:
     """Estimate the width of a table in characters; headings and the first column wrap between words."""
     width = 0
-    for place, heading in enumerate(header):
-        cells = [len(row[place].unescape()) for row in rows]
-        cells = cells if place else [min(cell, _WRAPS) for cell in cells]
+    for index, heading in enumerate(header):
+        cells = [len(row[index].unescape()) for row in rows]
+        cells = cells if index else [min(cell, _WRAPS) for cell in cells]
         width += 2 + max([*map(len, heading.split()), *cells], default=0)
     return width
 
@@ -168,9 +168,9 @@ def inline(words: str) -> Markup:
     return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(words))))
 
 
-def variables(place: int) -> str:
-    """Write the palette as variables of a style sheet; `place` 1: of light pages, 2: of dark pages."""
-    return " ".join(f"--{entry[0]}: {entry[place]};" for entry in PALETTE.values())
+def variables(index: int) -> str:
+    """Write the palette as variables of a style sheet; `index` 1: of light pages, 2: of dark pages."""
+    return " ".join(f"--{entry[0]}: {entry[index]};" for entry in PALETTE.values())
 
 
 def figure_markup(figure: Figure, description: str, *, number: int) -> str:

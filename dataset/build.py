@@ -295,6 +295,7 @@ def run(chunks: Sequence[Chunk], backend: Backend, show: Callable[[str], object]
                 continue
             if outcome.kind == "refused":
                 raise InputError(outcome.message)
+            # A death may be the machine's fault, an error is the row's: it would come again.
             kills[chunk.start] += outcome.kind == "died"
             if outcome.kind == "error" or kills[chunk.start] == KILLS:
                 reason = outcome.message or f"its worker died {KILLS} times"

@@ -64,6 +64,7 @@ def _paragraphs(
         words = [f"{low:.3g} to {high:.3g}" for low, high in pairwise(ends)]
         speed = np.clip(np.searchsorted(ends, rows["omega_bar"].abs(), "right") - 1, 0, _SPEEDS - 1)
         rows = rows.assign(speed=[words[index] for index in speed], index=speed)
+        # The index comes before the words, so that groups are in the order of speeds.
         regions = rows.groupby(["N", "index", "speed"])["failed"].agg(["size", "sum"]).reset_index()
         failed = regions[regions["sum"] > 0].drop(columns="index")
         yield _table(("N", "ω̄", "rows", "failed"), failed.itertuples(index=False))

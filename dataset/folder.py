@@ -106,6 +106,7 @@ class Folder:
                     os.close(open_no_link(self.path(LOCK), new=True))
                 file = os.fdopen(open_no_link(self.path(LOCK), new=False), "r+")
             with file:
+                # A hard link would let a lock file be another file, which is emptied below.
                 if os.fstat(file.fileno()).st_nlink > 1:
                     raise InputError(f"{self.path(LOCK)} is a link to another file; remove it")
                 try:
@@ -124,6 +125,7 @@ class Folder:
                     f"{self._root}/{LOCK}", note.encode(), mode="overwrite" if force else "create"
                 )
         except StorageError:
+            # Stores differ in what they raise where a file exists, so the reason is looked up.
             if LOCK not in self.names():
                 raise
             remedy = "wait until it ends, or take over with --force if it was killed"

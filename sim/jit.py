@@ -107,8 +107,8 @@ class Loop:
 
 
 class _Formula(Loop):
-    def __call__(self, *arguments: Any) -> Any:
-        return self.py_func(*arguments)
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        return self.py_func(*arguments, **named)
 
 
 def compiled(function: F) -> F:

@@ -173,6 +173,7 @@ def draw_variations(title: str, variations: Sequence[Variation], table: pd.DataF
             label = f"{second.values[k]:.4g}" if second else None
             axes.plot(x, curves[k], "o-", color=colour, lw=1.2, ms=4, label=label)
             axes.plot(x[doubtful[k]], curves[k][doubtful[k]], "o", color=colour, mfc="white", ms=4)
+        # An empty curve gives the legend one entry for all doubtful points.
         if doubtful.any():
             axes.plot([], [], "o", color="black", mfc="white", ms=4, label="no reliable answer")
         if none.any():

@@ -221,6 +221,7 @@ def _tracks(tracks: Mapping[str, DataFrame], plan: str | None) -> Comparison:
     files, read = dict[str, Cells](), list[tuple[Floats, Floats]]()
     figure, (axes, apart) = _plane(2)
     for k, (name, table) in enumerate(tracks.items()):
+        # Tail lengths of different robots differ, so tracks are compared in cm.
         with naming(name):
             in_cm = {"tail_length_m": 0.01, "time_scale_s": 1.0}
             times, poses = poses_of(table.drop(columns=[*_IN_TAILS], errors="ignore"), in_cm)
@@ -237,6 +238,7 @@ def _tracks(tracks: Mapping[str, DataFrame], plan: str | None) -> Comparison:
             for key in ("rms", "largest"):
                 cells[f"tracking error, {key} [mm]"] = Bounded(mm * getattr(error, key))
         if k:
+            # The first track is what the others are compared with.
             gaps = {"from its path": 10 * distance_to(read[0][1], poses[:, :2])}
             begin, end = max(times[0], read[0][0][0]), min(times[-1], read[0][0][-1])
             if begin < end:
@@ -297,13 +299,13 @@ def _dots(files: Mapping[str, Cells], titles: Sequence[str]) -> Figure:
 
     rows = max(1, -(-len(titles) // 2))
     figure = Figure(figsize=(7.5, (0.7 + 0.25 * len(files)) * rows), layout="constrained")
-    for place, title in enumerate(titles, 1):
-        axes = figure.add_subplot(rows, 2, place)
+    for number, title in enumerate(titles, 1):
+        axes = figure.add_subplot(rows, 2, number)
         for k, cells in enumerate(files.values()):
             if isinstance(cell := cells.get(title), Bounded):
                 axes.plot(cell.value, k, "o", color=f"C{k}", ms=5)
                 axes.plot([cell.low, cell.high], [k, k], color=f"C{k}", lw=1.5)
-        names = [*files] if place % 2 else [""] * len(files)
+        names = [*files] if number % 2 else [""] * len(files)
         axes.set_yticks(range(len(files)), names, fontsize=8, parse_math=False)
         axes.set_ylim(len(files) - 0.5, -0.5)
         axes.set_xlabel(title, fontsize=9)

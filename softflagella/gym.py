@@ -180,8 +180,8 @@ class PathEnv(gymnasium.Env[Observation, np.int64]):
     def _info(self, flipped: bool) -> dict[str, Any]:
         x, y, heading = self._pose
         point = np.array([[x + self._offset * math.cos(heading), y + self._offset * math.sin(heading)]])
-        place = self._law.state.step
-        near = np.arange(max(place - self._near, 0), min(place + self._near, len(self._moves)))
+        index = self._law.state.step
+        near = np.arange(max(index - self._near, 0), min(index + self._near, len(self._moves)))
         error = float(closest_segment(self._points, self._moves, point, near[None])[0][0])
         return {"error": error, "time": self._steps * self.every, "flipped": flipped}
 

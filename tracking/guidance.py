@@ -151,22 +151,22 @@ class TrackerGuidance(LineOfSight):
     def plan_way(self, pose: POSE) -> None:
         """Plan the way back from a pose to the path that remains after the place."""
         law = self._law
-        place = self.state.step if law.target == NO_WAY else law.target
+        index = self.state.step if law.target == NO_WAY else law.target
         drift, planned, rod = self._drift, self._planned, law.rod
-        rows = slice(place, law.last + 2)
+        rows = slice(index, law.last + 2)
         heading = np.array(law.heading[rows])
         known = planned.slip_at(heading)
         course, lean = heading + known, known - drift.slip_at(heading)
         x = np.array(law.x[rows]) + rod * (np.cos(heading) - np.cos(heading + lean))
         y = np.array(law.y[rows]) + rod * (np.sin(heading) - np.sin(heading + lean))
-        left_out = np.array(law.arc[rows]) - law.arc[place]
+        left_out = np.array(law.arc[rows]) - law.arc[index]
         allowed = left_out <= max(self._may_leave_out, 0.0)
         left_out = left_out[allowed]
         start = self._pivot(pose)
         targets, radius = np.stack([x, y, course], 1)[allowed], self._radius()
         track, target = shortest_way(start, targets, left_out, self._stride, radius)
         self._may_leave_out -= float(left_out[target])
-        at, way = min(place + target, law.last), self._way_of(track)
+        at, way = min(index + target, law.last), self._way_of(track)
         turns = round((way[-1].course + way[-1].curvature * way[-1].length - course[target]) / (2 * math.pi))
         self._turns = 2 * math.pi * turns
         self._law = law._replace(way=way, target=at, lean=float(lean[target]) + self._turns)

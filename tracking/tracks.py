@@ -210,6 +210,7 @@ def track_in_tails(track: pd.DataFrame, robot: Mapping[str, Any]) -> pd.DataFram
             if in_cm not in lab:
                 continue
             in_tails, given = numbers_of(track[over_l]) * cm, numbers_of(lab[in_cm])
+            # Both columns are rounded, so places agree within a share of the tail length and of themselves.
             if not (np.abs(in_tails - given) <= _ALIKE * (cm + np.abs(given))).all():
                 raise InputError(
                     f"{over_l} and {in_cm} of the track disagree with the plan's tail length, {cm:g} cm: it is "

@@ -82,8 +82,8 @@ def outcomes(seed: int, vehicle: bool) -> list[SwimOutcome] | str:
 
 def _outcome(seed: int, camera: str, current: float, stated: float, result: Swim) -> SwimOutcome:
     order = np.argsort(result.distance)
-    place = np.searchsorted(np.cumsum(result.weights()[order]), 0.95)
-    quantile = float(result.distance[order][place])
+    index = np.searchsorted(np.cumsum(result.weights()[order]), 0.95)
+    quantile = float(result.distance[order][index])
     return SwimOutcome(
         seed, camera, current, stated, result.within(stated), quantile, float(result.distance.max())
     )

@@ -81,7 +81,7 @@ def line(name: str, some: list[PlanOutcome], found: Callable[[PlanOutcome], floa
 def main(count: str = "60", first: str = "9000", replays: str = "10") -> None:
     compile_once()
     seeds = range(int(first), int(first) + int(count))
-    results = in_parallel(outcome, [(seed, place < int(replays)) for place, seed in enumerate(seeds)])
+    results = in_parallel(outcome, [(seed, index < int(replays)) for index, seed in enumerate(seeds)])
     plans = [result for result in results if isinstance(result, PlanOutcome)]
     for refused in (result for result in results if isinstance(result, str)):
         print(refused)

@@ -30,10 +30,10 @@ def main(*words: str) -> None:
     names = ["", *(name for name in catalogue() if needs_no_learning(name))]
     print(f"{'effect':24}{'N':>5}{'refused':>9}{'yaw rate: median, 95 %, worst':>32}{'surge (of the speed)':>26}"
           f"{'coverage':>10}")  # fmt: skip
-    for place, name in enumerate(names):
+    for index, name in enumerate(names):
         for tails in (1, 2, 3):
-            robots = draw_robots(COUNT, SEED + 10 * place + tails, wide=False)
-            random = np.random.default_rng([place, tails])
+            robots = draw_robots(COUNT, SEED + 10 * index + tails, wide=False)
+            random = np.random.default_rng([index, tails])
             robots["N"] = np.full(COUNT, float(tails)) if tails < 3 else random.integers(3, 9, COUNT).astype(float)
             if name:
                 low, high = catalogue()[name].plausible or (_WALL if name == "tank_wall" else _DRIFT)

@@ -88,11 +88,11 @@ def main(most: str = "100000", figure: str = "") -> None:
 def draw(drawn: dict[int, dict[str, Floats]], figure: str) -> None:
     """Draw errors against rows, medians and 95 % quantiles."""
     picture, axes = plt.subplots(figsize=(7, 3.6), layout="constrained")
-    for place, (name, words) in enumerate(_OUTPUTS.items()):
+    for index, (name, words) in enumerate(_OUTPUTS.items()):
         for share, style in ((0.5, "o-"), (0.95, "o--")):
             values = [np.quantile(found[name], share) for found in drawn.values()]
             label = words if share == 0.5 else None
-            axes.plot(list(drawn), values, style, color=f"C{place}", ms=4, label=label)
+            axes.plot(list(drawn), values, style, color=f"C{index}", ms=4, label=label)
     axes.set_xscale("log", base=2)
     axes.set_xticks(list(drawn), [f"{count:,}" for count in drawn])
     axes.minorticks_off()

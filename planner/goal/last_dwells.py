@@ -55,16 +55,16 @@ class Ending:
     least: float  # dwell that the motor allows
     shorter: float  # share of the plan's shortest dwell that these dwells must keep
 
-    def __call__(self, switches: Switches, declared: FeasiblePath, setting: Trial) -> Switches:
+    def __call__(self, switches: Switches, declared: FeasiblePath, trial: Trial) -> Switches:
         """Change a schedule: without any or some of its last dwells, whichever costs least."""
-        least = min(setting.dwell, max(self.least, self.shorter * setting.dwell))
+        least = min(trial.dwell, max(self.least, self.shorter * trial.dwell))
         best, lowest = switches, math.inf
         for count in range(len(switches.dwells), max(len(switches.dwells) - _DROPPED, 1) - 1, -1):
             fewer = Switches(switches.first_direction, switches.dwells[:count], switches.poses[: count + 1])
-            candidate, cost = _ended(fewer, self.goal, setting.tracked.vehicle, least)
+            candidate, cost = _ended(fewer, self.goal, trial.tracked.vehicle, least)
             if cost < lowest:
                 best, lowest = candidate, cost
-        return replace(best, poses=roll_out(setting.tracked.vehicle, best, samples=1).flips)
+        return replace(best, poses=roll_out(trial.tracked.vehicle, best, samples=1).flips)
 
 
 def _ended(switches: Switches, goal: POSE, vehicle: Vehicle, least: float) -> tuple[Switches, float]:

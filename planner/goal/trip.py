@@ -159,8 +159,8 @@ def to_goal(
         stops = _stops(begin, end, passed, vehicle.pivot_distance, drift)
         return route(stops, limits, margin, lattices.setdefault(drift, {}), swims)
 
-    def source(setting: Trial) -> FeasiblePath:
-        way = track(setting.drift, setting.margin or 0.0)
+    def source(trial: Trial) -> FeasiblePath:
+        way = track(trial.drift, trial.margin or 0.0)
         if way.total > LONGEST:
             raise InputError(f"the way is {in_lab(way.total, swims)} long; at most {LONGEST:g} l can be planned")
         poses = way.chain(_SPACING)
@@ -168,12 +168,12 @@ def to_goal(
             raise InputError("start and goal are the same; nothing to do")
         # The guaranteed bound is for paths that turn less than the robot can; these arcs turn as much as it can.
         return FeasiblePath(
-            Reference.of_pivot(poses, tracked.rod, drift=setting.drift, heading=begin[2]), curvature=0.0
+            Reference.of_pivot(poses, tracked.rod, drift=trial.drift, heading=begin[2]), curvature=0.0
         )
 
     task = PathTask(
         source=source, start=lambda declared: Start(begin, declared.reference.first_turn),
-        ending=Ending(end, least_dwell, _SHORTER), zigzags=_ZIGZAGS, longer=False, blocked=NoWayError,
+        finish=Ending(end, least_dwell, _SHORTER), zigzags=_ZIGZAGS, try_longer=False, blocked=NoWayError,
     )  # fmt: skip
     plan = solve(task, tracked, request, progress)
     margin = 0.0 if plan.kept_clear is None else plan.kept_clear.margin

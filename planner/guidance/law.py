@@ -1,7 +1,7 @@
 """The law of guidance: when the motor flips next, from plain numbers.
 
 Its equations stand in `planner.guidance.line_of_sight`. All functions are formulas: a plan follows a whole path
-in a compiled loop (`follow_some`), a tracker asks for one flip at a time in plain Python. The time of a flip is
+in a compiled loop (`follow_dwells`), a tracker asks for one flip at a time in plain Python. The time of a flip is
 the root of one equation, which the secant method finds in about four evaluations. Their cost does not depend on
 the length of the path: the place on it is remembered, and moves forward.
 
@@ -97,6 +97,12 @@ class NextFlip(NamedTuple):
 
 
 @formula
+def placed(state: PathState, step: int, share: float, leg: int, along: float, error: float) -> PathState:
+    """Move the robot on path and way; what the law remembers of the last flip stays."""
+    return PathState(step, share, leg, along, error, state.last_error, state.bias, state.reached)
+
+
+@formula
 def side_of(sense: int) -> int:
     """Return the index of a direction of the motor."""
     return 0 if sense > 0 else 1
@@ -181,7 +187,7 @@ def _excess_on_path(law: GuidanceLaw, state: PathState, pose: POSE, sense: int) 
     within = min(max(share, 0.0), 1.0)
     wanted = law.heading[i] + within * (law.heading[i + 1] - law.heading[i])
     wanted -= math.atan(error / law.ahead) + state.bias
-    there = PathState(i, share, SEGMENTS, 0.0, error, state.last_error, state.bias, state.reached)
+    there = placed(state, step=i, share=share, leg=SEGMENTS, along=0.0, error=error)
     return sense * (heading - wanted) - law.hysteresis[i], there
 
 
@@ -223,16 +229,14 @@ def excess(law: GuidanceLaw, state: PathState, pose: POSE, sense: int) -> tuple[
         if along > segment.length and moved >= 0:
             leg, along, moved = leg + 1, 0.0, 1
             if leg == SEGMENTS:
-                at_target = PathState(
-                    law.target, state.share, leg, along, error, state.last_error, state.bias, state.reached
-                )
+                at_target = placed(state, step=law.target, share=state.share, leg=leg, along=along, error=error)
                 return _excess_on_path(law, at_target, pose, sense)
         elif along < 0 and leg > 0 and moved <= 0:
             leg, along, moved = leg - 1, way[leg - 1].length, -1
         else:
             break
     wanted = segment.course + segment.curvature * along - math.atan(error / law.way_ahead)
-    there = PathState(law.target, state.share, leg, along, error, state.last_error, state.bias, state.reached)
+    there = placed(state, step=law.target, share=state.share, leg=leg, along=along, error=error)
     return sense * (course - wanted) - segment.hysteresis, there
 
 
@@ -370,7 +374,7 @@ def _end(
     return NextFlip(high, True, False, state)
 
 
-class Following(NamedTuple):
+class FollowState(NamedTuple):
     """A schedule that is being made: where the robot is, and what has become of it."""
 
     pose: POSE
@@ -385,32 +389,32 @@ class Following(NamedTuple):
 
 
 @compiled
-def follow_some(
-    law: GuidanceLaw, following: Following, patience: float, dwells: Floats, poses: Floats
-) -> Following:
+def follow_dwells(
+    law: GuidanceLaw, start: FollowState, patience: float, dwells: Floats, poses: Floats
+) -> FollowState:
     """Write dwells (n,) and the poses after them (n, 3), until the path ends or the robot does not get ahead.
 
     Args:
         law: what is followed.
-        run: where to go on.
+        start: where to go on.
         patience: time that may pass without progress along the path.
         dwells: written to.
         poses: written to.
     """
     pose, sense, before, state, furthest, stalled = (
-        following.pose,
-        following.sense,
-        following.before,
-        following.state,
-        following.furthest,
-        following.stalled,
+        start.pose,
+        start.sense,
+        start.before,
+        start.state,
+        start.furthest,
+        start.stalled,
     )
     done = 0
     for _ in range(len(dwells)):
         flip = next_dwell(law, state, pose, sense, before, 0.0)
         state = flip.state
         if flip.lost:
-            return Following(pose, sense, before, state, furthest, stalled, done, False, True)
+            return FollowState(pose, sense, before, state, furthest, stalled, done, False, True)
         if flip.time > 0:
             pose = pose_after(law, pose, sense, before, flip.time)
             state = integrate(law, state, pose, sense)
@@ -418,9 +422,9 @@ def follow_some(
             poses[done] = pose
             done, sense, before = done + 1, -sense, flip.time
         if flip.ended:
-            return Following(pose, sense, before, state, furthest, stalled, done, True, False)
+            return FollowState(pose, sense, before, state, furthest, stalled, done, True, False)
         stalled = 0.0 if state.step > furthest else stalled + flip.time
         furthest = max(furthest, state.step)
         if stalled > patience:
             break
-    return Following(pose, sense, before, state, furthest, stalled, done, False, False)
+    return FollowState(pose, sense, before, state, furthest, stalled, done, False, False)

@@ -38,11 +38,11 @@ from common.arrays import Floats
 from common.errors import InputError
 from planner.guidance.law import (
     REST,
-    Following,
+    FollowState,
     GuidanceLaw,
     PathState,
     approach,
-    follow_some,
+    follow_dwells,
     has_ended,
     integrate,
     lag_after,
@@ -193,12 +193,12 @@ def follow(
     start = start or start_at_rest(reference, vehicle, guidance, offset)
     law = law_of(reference, vehicle, guidance, offset)
     patience = _PATIENCE * (guidance.ahead + law.rod + vehicle.turn_radius) / max(vehicle.speed, 1e-300)
-    following = Following(start.pose, start.sense, REST, PathState())
+    following = FollowState(start.pose, start.sense, REST, PathState())
     dwells, poses = [np.empty(0)], [np.array([start.pose])]
     switches = 0
     while not following.ended:
         times, places = np.empty(_EVERY), np.empty((_EVERY, 3))
-        following = follow_some(law, following, patience, times, places)
+        following = follow_dwells(law, following, patience, times, places)
         dwells.append(times[: following.done])
         poses.append(places[: following.done])
         switches += following.done

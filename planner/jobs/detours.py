@@ -50,24 +50,24 @@ _DIFFERENCE = 1e-4  # l, for derivatives of distances
 
 @dataclass(frozen=True)
 class Around:
-    """Replaces what obstacles block of a declared path by ways around, once a setting has a margin."""
+    """Replaces what obstacles block of a declared path by ways around, once a trial has a margin."""
 
     space: FreeSpace  # walls and regions
     drawn: Path2D  # the path as drawn
     detours: dict[Drift, Detours] = field(default_factory=dict)  # they have lattices
 
-    def __call__(self, declared: FeasiblePath, setting: Trial) -> FeasiblePath:
+    def __call__(self, declared: FeasiblePath, trial: Trial) -> FeasiblePath:
         """Keep clear.
 
         Raises:
             BlockedError: there is no way around; it says whether there is one without a margin.
         """
-        if setting.margin is None:
+        if trial.margin is None:
             return declared
-        drift = setting.drift
-        ways = self.detours.setdefault(drift, Detours(setting.tracked, self.space, drift))
+        drift = trial.drift
+        ways = self.detours.setdefault(drift, Detours(trial.tracked, self.space, drift))
         try:
-            reference, detours = ways.around(declared.reference, setting.margin)
+            reference, detours = ways.around(declared.reference, trial.margin)
         except BlockedError as blocked:
             try:
                 ways.around(declared.reference, 0.0)

@@ -113,11 +113,11 @@ def make_plan(
         feasibility = Feasibility(tracked.robot, vehicle, tracked.rod, drift, corner, request.time_weight)
         return make_feasible(drawn, feasibility, progress)
 
-    task = PathTask(source=lambda setting: nearest(setting.drift), drawn=drawn, quickest=request.space.empty)
+    task = PathTask(source=lambda trial: nearest(trial.drift), drawn=drawn, quickest=request.space.empty)
     if not request.space.empty:
         from planner.jobs.detours import Around  # loads SciPy's graphs
 
-        task = replace(task, around=Around(request.space, drawn))
+        task = replace(task, avoid=Around(request.space, drawn))
     once = solve(task, tracked, request, progress)
     if not request.loop:
         return once

@@ -27,7 +27,7 @@ from common.keywords import checks_keywords
 from common.units import format_time
 from planner.goal.route import best_options
 from planner.jobs.shortest_order import EXACT, shortest_order
-from planner.jobs.travel import SLACK, Travel, plan_track, preferred_setting
+from planner.jobs.travel import SLACK, Travel, plan_track, preferred_trial
 from planner.options import AnyVehicle, JobOptions, asked, places_of
 from planner.paths.distance import distance_to
 from planner.paths.dubins import DubinsPaths
@@ -142,11 +142,11 @@ def tour(
     """
     tracked, request = asked(robot, options)
     visited = _checked(places_of(places, options.get("unit"), tracked.robot))
-    task, setting = _Tour(visited, any_start, back), preferred_setting(tracked, request)
-    margin = 1.5 * setting.straight.largest
+    task, trial = _Tour(visited, any_start, back), preferred_trial(tracked, request)
+    margin = 1.5 * trial.straight.largest
     for _ in range(_MARGINS):
-        found = task.ordered(Travel.of(setting, request.space, margin), options.get("progress"))
-        plan = plan_track(partial(task.track, found), setting, request, options.get("progress"))
+        found = task.ordered(Travel.of(trial, request.space, margin), options.get("progress"))
+        plan = plan_track(partial(task.track, found), trial, request, options.get("progress"))
         if plan.kept_clear is None or not plan.kept_clear.detours or plan.kept_clear.margin <= margin:
             break
         margin = plan.kept_clear.margin
@@ -183,6 +183,7 @@ class _Tour(NamedTuple):
     def ordered(self, travel: Travel, progress: ProgressCallback | None) -> _Ordered:
         """Find the order, and refine the directions of motion."""
         count = len(self.places)
+        # Obstacles make times estimates, and an order on estimates is proven for nothing.
         exact = count - (not self.any_start) <= EXACT and travel.limits.space.empty
         options = COURSES if exact else FEWER_COURSES
         courses = 2 * math.pi * np.arange(options) / options
@@ -199,10 +200,12 @@ class _Tour(NamedTuple):
         costs = travel.times(np.repeat(flat, len(flat), 0), np.tile(flat, (len(flat), 1)), progress)
         costs = costs.reshape(count, options, count, options)
         closing = costs.min(-1).transpose(2, 0, 1) if self.back else np.zeros((count, count, options))
+        # A given start has no choice of course: its row is the start's cost, and it is left out of the order.
         if self.any_start:
             first, start, end = 0, np.where(free, 0.0, np.inf), closing if self.back else closing[0]
         else:
             first, start, end = 1, costs[0, :, 1:].min(0), closing[0, 1:]
+        # Rivals are within what finer courses may change, so the best order is known only after refining.
         best = shortest_order(costs[first:, :, first:], start, end)
         refined = []
         for visits in (best.visits, *best.rivals):

@@ -48,11 +48,11 @@ class Travel:
     turning: float  # speed in turns
 
     @staticmethod
-    def of(setting: Trial, space: FreeSpace, margin: float) -> Travel:
+    def of(trial: Trial, space: FreeSpace, margin: float) -> Travel:
         """Take the vehicle's radius and speeds."""
-        tracked, straight = setting.tracked, setting.straight.net_speed
+        tracked, straight = trial.tracked, trial.straight.net_speed
         own = float(np.abs(tracked.vehicle.twist[:, 0]).mean())
-        limits = RouteLimits(tracked.vehicle.pivot_radius / AS_DRAWN, tracked.body, space, setting.drift)
+        limits = RouteLimits(tracked.vehicle.pivot_radius / AS_DRAWN, tracked.body, space, trial.drift)
         return Travel(tracked, limits, margin, straight, straight + AS_DRAWN * (own - straight))
 
     def drifting(self, drift: Drift) -> Travel:
@@ -111,7 +111,7 @@ class Travel:
         return np.where(turns == 0, self.straight, self.turning)
 
 
-def preferred_setting(tracked: TrackedVehicle, request: PlanRequest) -> Trial:
+def preferred_trial(tracked: TrackedVehicle, request: PlanRequest) -> Trial:
     """Return the vehicle with the dwell that the objective prefers."""
     least = request.least_dwell(tracked.robot)
     return Trial.of(tracked, request.dwell or dwells_for(tracked.vehicle, request.objective, least)[0])
@@ -130,11 +130,11 @@ def plan_track(
     """
     tracked, space = preferred.tracked, request.space
 
-    def source(setting: Trial) -> FeasiblePath:
-        reference = Reference.of_pivot(track(setting.drift).chain(_SPACING), tracked.rod, setting.drift)
+    def source(trial: Trial) -> FeasiblePath:
+        reference = Reference.of_pivot(track(trial.drift).chain(_SPACING), tracked.rod, trial.drift)
         return FeasiblePath(reference, float(np.abs(reference.curvature).max()))
 
     drawn = Path2D(source(preferred).reference.p, False)
     check_size(drawn, tracked.robot, tracked.vehicle.turn_radius, tracked.vehicle.speed)
-    around = None if space.empty else Around(space, drawn)
-    return solve(PathTask(source=source, around=around, drawn=drawn), tracked, request, progress)
+    avoid = None if space.empty else Around(space, drawn)
+    return solve(PathTask(source=source, avoid=avoid, drawn=drawn), tracked, request, progress)

@@ -101,8 +101,8 @@ function bounds(points) {
   return [0, 1].map((axis) => [smallest(column(points, axis)), largest(column(points, axis))]);
 }
 
-/* The last place of rising knots whose value is at most x; −1 if there is none. */
-function placeBelow(knots, x) {
+/* The last index of rising knots whose value is at most x; −1 if there is none. */
+function indexBelow(knots, x) {
   let low = -1, high = knots.length;
   while (high - low > 1) {
     const middle = (low + high) >> 1;
@@ -116,7 +116,7 @@ function placeBelow(knots, x) {
 function interp(x, knots, values) {
   const last = knots.length - 1;
   return Float64Array.from(x, (at) => {
-    const j = placeBelow(knots, at);
+    const j = indexBelow(knots, at);
     if (j < 0) return values[0];
     if (j >= last) return values[last];
     return ((values[j + 1] - values[j]) / (knots[j + 1] - knots[j])) * (at - knots[j]) + values[j];
@@ -215,7 +215,7 @@ function splineMatrix(knots, places, flatEnd = false) {
   if (!flatEnd) notAKnot(slopes[last], last - 1, last - 2);
   solveDense(matrix, slopes);
   return Array.from(places, (place) => {
-    const i = clip(placeBelow(knots, place), 0, last - 1), t = (place - knots[i]) / h[i], bent = h[i] * t * (1 - t);
+    const i = clip(indexBelow(knots, place), 0, last - 1), t = (place - knots[i]) / h[i], bent = h[i] * t * (1 - t);
     const row = slopes[i].map((slope, k) => bent * ((1 - t) * slope - t * slopes[i + 1][k]));
     row[i] += (1 + 2 * t) * (1 - t) ** 2;
     row[i + 1] += t ** 2 * (3 - 2 * t);
@@ -224,5 +224,5 @@ function splineMatrix(knots, places, flatEnd = false) {
 }
 
 export { TAU, MIRROR, mod, halfTurn, clip, sum, mean, dot, largest, smallest, largestSize, median, quantile };
-export { runningSum, differences, linspace, geomspace, column, bounds, placeBelow, interp, unwrap, convolved, compose };
+export { runningSum, differences, linspace, geomspace, column, bounds, indexBelow, interp, unwrap, convolved, compose };
 export { inversePose, arc, solveDense, inverse, splineMatrix };

@@ -121,14 +121,14 @@ function distances(poses, { target, distance }) {
 
 /* Minimise by Gauss-Newton with Levenberg's damping, for one weight of the constraints. */
 function descend(poses, task, weight) {
-  const place = places(poses.x.length, task.turn !== null);
-  let damping = 1e-3, system = normalEquations(poses, task, weight, place);
+  const index = indices(poses.x.length, task.turn !== null);
+  let damping = 1e-3, system = normalEquations(poses, task, weight, index);
   for (let round = 0; round < ITERATIONS; round++) {
     let moved = null, candidate = null;
     for (; damping < 1e6; damping *= candidate ? 6 : 10) {
       const step = dampedStep(system, damping);
-      if (step !== null) moved = stepped(poses, step, place);
-      candidate = step && normalEquations(moved, task, weight, place);
+      if (step !== null) moved = stepped(poses, step, index);
+      candidate = step && normalEquations(moved, task, weight, index);
       if (candidate?.cost < system.cost) break;
     }
     if (!(candidate?.cost < system.cost)) return poses;
@@ -141,10 +141,10 @@ function descend(poses, task, weight) {
   return poses;
 }
 
-/* Poses after a step, which is sorted by `place`. */
-function stepped({ x, y, heading }, step, place) {
+/* Poses after a step, which is sorted by `index`. */
+function stepped({ x, y, heading }, step, index) {
   const [newX, newY, newHeading] = [x, y, heading].map((values, axis) => values.map((value, i) => {
-    return value - step[3 * place[i] + axis];
+    return value - step[3 * index[i] + axis];
   }));
   return { x: newX, y: newY, heading: newHeading };
 }
@@ -157,10 +157,10 @@ function wholeLap({ x, y, heading }, turn) {
 
 /* The linearised least squares: {cost, band, right, width}.
  *
- * The matrix is symmetric. band[row][d] is its entry in column `row`, d rows below the diagonal. place: where each pose
+ * The matrix is symmetric. band[row][d] is its entry in column `row`, d rows below the diagonal. index: where each pose
  * stands, in poses. Residuals are the distances from the target, and of each step its slip, what it turns further than
  * the robot can, what it is too short and uneven, and the root of the time that it takes. */
-function normalEquations({ x, y, heading }, task, weight, place) {
+function normalEquations({ x, y, heading }, task, weight, index) {
   const { target, sides, shares, distance, radius, drift, spacing, timeWeight, turn } = task, count = x.length;
   const width = turn === null ? 5 : 8, right = new Float64Array(3 * count);
   const band = new Float64Array(3 * count * (width + 1));
@@ -176,7 +176,7 @@ function normalEquations({ x, y, heading }, task, weight, place) {
     }
   };
   const settle = (first, pose) => {
-    for (let axis = 0; axis < 3; axis++) at[first + axis] = 3 * place[pose] + axis;
+    for (let axis = 0; axis < 3; axis++) at[first + axis] = 3 * index[pose] + axis;
   };
   for (let m = 0; m < count; m++) {
     const aheadX = distance * Math.cos(heading[m]), aheadY = distance * Math.sin(heading[m]);
@@ -216,11 +216,11 @@ function normalEquations({ x, y, heading }, task, weight, place) {
   return { cost, band, right, width };
 }
 
-/* Order the poses in the system so that neighbours are near one another: the place of each. */
-function places(count, closed) {
-  const place = new Int32Array(count), half = Math.floor((count + 1) / 2);
-  for (let i = 0; i < count; i++) place[i] = !closed ? i : i < half ? 2 * i : 2 * (count - 1 - i) + 1;
-  return place;
+/* Order the poses in the system so that neighbours are near one another: the index of each. */
+function indices(count, closed) {
+  const index = new Int32Array(count), half = Math.floor((count + 1) / 2);
+  for (let i = 0; i < count; i++) index[i] = !closed ? i : i < half ? 2 * i : 2 * (count - 1 - i) + 1;
+  return index;
 }
 
 /* Solve the damped normal equations by Cholesky's method; null where they are not positive definite. */

@@ -56,7 +56,7 @@ class Lattice {
   }
 
   pose(index) {
-    const k = index % this.courses, place = (index - k) / this.courses, iy = place % this.ny, ix = (place - iy) / this.ny;
+    const k = index % this.courses, cell = (index - k) / this.courses, iy = cell % this.ny, ix = (cell - iy) / this.ny;
     return [this.low[0] + ix * this.spacing, this.low[1] + iy * this.spacing, this.courseOf(k)];
   }
 
@@ -116,7 +116,7 @@ class Lattice {
     for (let least = 0; least < queue.length && cost[last] >= least; least++) {
       for (const at of queue[least] ?? []) {
         if (at === last || leastBy(at) !== least) continue;
-        const k = at % courses, place = (at - k) / courses, iy = place % this.ny, ix = (place - iy) / this.ny;
+        const k = at % courses, cell = (at - k) / courses, iy = cell % this.ny, ix = (cell - iy) / this.ny;
         for (const { i, j, ahead, length } of this.joints[k]) {
           const inside = ix + i >= 0 && ix + i < this.nx && iy + j >= 0 && iy + j < this.ny;
           if (inside) offer(at, at - k + ahead, length);

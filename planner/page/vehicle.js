@@ -13,7 +13,7 @@
  * left and heading. Switches are {firstDirection ±1, dwells, poses}: dwell times, and poses [x, y, heading] of the
  * head's centre at the flips and the end. Lengths in l, times in μ0 l⁴/EI, angles in rad. */
 import { CONSTANTS } from "./constants.js";
-import { arc, clip, column, compose, dot, geomspace, interp, largest, largestSize, mean, placeBelow } from "./math.js";
+import { arc, clip, column, compose, dot, geomspace, interp, largest, largestSize, mean, indexBelow } from "./math.js";
 import { splineMatrix } from "./math.js";
 import { InputError, general, quoted } from "./words.js";
 
@@ -51,7 +51,7 @@ function restAt(table, time) {
 /* Where the lag after `time` and a dwell `before` is in a flat table of lags. */
 function lagPlace(before, time) {
   const { i, share } = stepBelow(time), last = BEFORE_KNOTS.length - 1;
-  const held = clip(before, BEFORE_KNOTS[0], BEFORE_KNOTS[last]), k = Math.min(placeBelow(BEFORE_KNOTS, held), last - 1);
+  const held = clip(before, BEFORE_KNOTS[0], BEFORE_KNOTS[last]), k = Math.min(indexBelow(BEFORE_KNOTS, held), last - 1);
   const part = (held - BEFORE_KNOTS[k]) / (BEFORE_KNOTS[k + 1] - BEFORE_KNOTS[k]);
   return { first: 3 * (k * COUNT + i), share, part };
 }

@@ -208,6 +208,7 @@ def _planner_data(lookup: LookupTable, robot: Robot, tracked: TrackedVehicle, wh
             ],
             "before": curves.before,
             "phaseRate": vehicle.phase_rate.tolist(),
+            # A steady error has no curves; two tables of zeros would be half of the page's data.
             "errors": [
                 {"twist": twist.tolist(), "lag": lag, "memory": memory}
                 if lag.any() or memory.any()

@@ -208,16 +208,16 @@ def _distances(poses: Floats, task: PoseProblem) -> Floats:
 def _descend(poses: Floats, task: PoseProblem, weight: float) -> Floats:
     """Minimise by Gauss-Newton with Levenberg's damping, for one weight of the constraints."""
     damping = 1e-3
-    place = places(len(poses), closed=task.turn is not None)
+    index = indices(len(poses), closed=task.turn is not None)
     system = normal_equations(poses, task, weight)
     for _ in range(_ITERATIONS):
-        band, right = sorted_equations(system, place)
+        band, right = sorted_equations(system, index)
         while damping < 1e6:
             step = damped_step(band, right, damping)
             if step is None:
                 damping *= 10
                 continue
-            tried = poses - step.reshape(-1, 3)[place]
+            tried = poses - step.reshape(-1, 3)[index]
             candidate = normal_equations(tried, task, weight)
             if candidate.cost < system.cost:
                 break
@@ -397,20 +397,20 @@ def _step_part(
     )  # fmt: skip
 
 
-def places(count: int, *, closed: bool) -> Integers:
+def indices(count: int, *, closed: bool) -> Integers:
     """Order the poses in the system (m,) so that neighbours are near one another."""
     order = np.arange(count)
     if closed:
         order[::2], order[1::2] = np.arange((count + 1) // 2), np.arange(count - 1, (count - 1) // 2, -1)
-    place = np.empty(count, dtype=np.int64)
-    place[order] = np.arange(count)
-    return place
+    index = np.empty(count, dtype=np.int64)
+    index[order] = np.arange(count)
+    return index
 
 
-def sorted_equations(system: PoseNormalEquations, place: Integers) -> tuple[Floats, Floats]:
-    """Assemble the normal matrix, lower form (band, 3 m), and the right side (3 m,), sorted by `place`."""
-    count, first = len(place), place[: system.across.shape[2]]
-    second = np.roll(place, -1)[: len(first)]
+def sorted_equations(system: PoseNormalEquations, index: Integers) -> tuple[Floats, Floats]:
+    """Assemble the normal matrix, lower form (band, 3 m), and the right side (3 m,), sorted by `index`."""
+    count, first = len(index), index[: system.across.shape[2]]
+    second = np.roll(index, -1)[: len(first)]
     later = second > first
     low, high = np.where(later, first, second), np.where(later, second, first)
     width = 3 * int((high - low).max()) + 2
@@ -418,9 +418,9 @@ def sorted_equations(system: PoseNormalEquations, place: Integers) -> tuple[Floa
     for i in range(3):
         for j in range(3):
             if j >= i:
-                band[j - i, place, i] = system.diagonal[i, j]
+                band[j - i, index, i] = system.diagonal[i, j]
             # row j of the later pose, column i of the earlier one
             band[3 * (high - low) + j - i, low, i] = np.where(later, system.across[i, j], system.across[j, i])
     right = np.empty((count, 3))
-    right[place] = system.gradient.T
+    right[index] = system.gradient.T
     return band.reshape(width + 1, -1), right.reshape(-1)

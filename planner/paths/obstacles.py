@@ -230,8 +230,8 @@ class Map:
 
     def distance(self, points: Floats) -> Floats:
         """Bound the distance of points (M, 2) from below, (M,); outside the map nothing is free."""
-        place = np.rint((points - self._low) / self.step).astype(int)
+        index = np.rint((points - self._low) / self.step).astype(int)
         last: Integers = np.array([len(self.table) - 1, len(self.table.T) - 1])
-        inside = ((place >= 0) & (place <= last)).all(1)
-        i, j = np.clip(place, 0, last).T
+        inside = ((index >= 0) & (index <= last)).all(1)
+        i, j = np.clip(index, 0, last).T
         return np.where(inside, self.table[i, j] - self.slack, -np.inf)

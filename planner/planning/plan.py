@@ -408,6 +408,7 @@ class Plan(Shown, Generic[J]):
             "offset_over_l": self.tracked.offset,
             "first_direction": self.first_direction,
             "start": {"x_over_l": x, "y_over_l": y, "heading_rad": heading},
+            # Readers go by these names; `FORMAT` counts their changes.
             "dwell_bar": self.dwells.tolist(),
             "dwell_s": self.seconds.tolist(),
             "predicted_poses": self.poses.tolist(),

@@ -1,6 +1,6 @@
 """From a request to a plan: one solver for all jobs.
 
-1. A task's source gives a declared path for a setting: the vehicle with one shortest dwell, and a margin.
+1. A task's source gives a declared path for a trial: the vehicle with one shortest dwell, and a margin.
 2. Where obstacles block it, ways around them change it.
 3. Line-of-sight guidance follows the path, which gives the schedule, and its errors are computed
    (`_followed`).
@@ -81,32 +81,32 @@ class PathTask:
     """What is to be followed."""
 
     source: Callable[[Trial], FeasiblePath]  # where the reference comes from
-    around: Change | None = None  # keeps it clear of obstacles
+    avoid: Change | None = None  # keeps it clear of obstacles
     drawn: Path2D | None = None  # None: the declared path counts as drawn
     start: Callable[[FeasiblePath], Start] | None = None  # None: at rest on the path
-    ending: Ending | None = None
+    finish: Ending | None = None
     zigzags: float | None = None  # first margin over the zigzag; None: first there is no margin
-    longer: bool = True  # longer dwells are tried, too: for a small error, and where the path is blocked
+    try_longer: bool = True  # longer dwells are tried, too: for a small error, and where the path is blocked
     quickest: bool = False  # for the shortest time, the path is followed with several dwells
     blocked: type[BlockedError] = BlockedError
 
-    def declared(self, setting: Trial) -> FeasiblePath:
+    def declared(self, trial: Trial) -> FeasiblePath:
         """Declare a path, with ways around what blocks it."""
-        declared = self.source(setting)
-        return declared if self.around is None else self.around(declared, setting)
+        declared = self.source(trial)
+        return declared if self.avoid is None else self.avoid(declared, trial)
 
 
 def _followed(
-    task: PathTask, declared: FeasiblePath, setting: Trial, request: PlanRequest, progress: ProgressCallback | None
+    task: PathTask, declared: FeasiblePath, trial: Trial, request: PlanRequest, progress: ProgressCallback | None
 ) -> Plan[None]:
     """Follow a declared path, and compute the errors; from a start away from the path none is guaranteed."""
-    tracked, straight = setting.tracked, setting.straight
-    vehicle, guidance = tracked.vehicle, setting.guidance(declared)
+    tracked, straight = trial.tracked, trial.straight
+    vehicle, guidance = tracked.vehicle, trial.guidance(declared)
     drawn = task.drawn or Path2D(declared.reference.p, False)
     start = task.start(declared) if task.start else None
     switches = follow(declared.reference, vehicle, guidance, tracked.offset, start=start, progress=progress)
-    if task.ending is not None:
-        switches = task.ending(switches, declared, setting)
+    if task.finish is not None:
+        switches = task.finish(switches, declared, trial)
         guidance = guidance._replace(dwell=min(guidance.dwell, float(switches.dwells.min())))
     bound = None if start else guaranteed(vehicle, tracked.rod, straight.swing, guidance.ahead)
     errors = plan_errors(tracked, drawn, declared, switches, guaranteed=bound, seed=request.seed,
@@ -133,20 +133,20 @@ def at_dwell(
     Raises:
         BlockedError: there is no such plan.
     """
-    setting, space = Trial.of(tracked, dwell), request.space
+    trial, space = Trial.of(tracked, dwell), request.space
     if task.zigzags and not space.empty:
-        setting = setting._replace(margin=task.zigzags * setting.straight.largest)
+        trial = trial._replace(margin=task.zigzags * trial.straight.largest)
     plan: Plan[None] | None = None
-    for _ in range(_MARGINS + (setting.margin is None)):
-        declared = task.declared(setting)
+    for _ in range(_MARGINS + (trial.margin is None)):
+        declared = task.declared(trial)
         if plan is None or not declared.same(plan.declared):
-            plan = _followed(task, declared, setting, request, progress)
+            plan = _followed(task, declared, trial, request, progress)
         if space.empty:
             return plan
-        needed, margin = plan.margin_needed, setting.margin
+        needed, margin = plan.margin_needed, trial.margin
         if margin is not None and needed <= margin and (clearance := plan.clearance(space)) > 0:
             return replace(plan, kept_clear=KeptClear(space, margin, clearance, declared.detours))
-        setting = setting._replace(margin=max(_MORE * needed, _GROWS * (margin or 0.0)))
+        trial = trial._replace(margin=max(_MORE * needed, _GROWS * (margin or 0.0)))
     raise task.blocked(
         f"there is no way that leaves the plan's stated error around the robot: it is "
         f"{in_lab(needed, tracked.robot)}; plan with feedback, make a table of this robot ({OWN_TABLE}), or move "
@@ -179,12 +179,12 @@ def solve(
             dwells = [fastest, *(dwell for dwell in dwells if dwell < fastest)]
         shorter = np.unique(np.linspace(0, len(dwells) - 1, _OTHERS + 1).astype(int)).tolist()
         others = [
-            *(longer_dwells(vehicle, dwells[0])[:_OTHERS] if task.longer else ()),
+            *(longer_dwells(vehicle, dwells[0])[:_OTHERS] if task.try_longer else ()),
             *(dwells[k] for k in shorter),
         ]
     first = dwells[0]
-    if task.longer and request.objective == "error" and request.dwell is None:
-        free, unhindered = replace(task, around=None), replace(request, space=FreeSpace())
+    if task.try_longer and request.objective == "error" and request.dwell is None:
+        free, unhindered = replace(task, avoid=None), replace(request, space=FreeSpace())
         with suppress(*([] if request.space.empty else [InputError])):  # there may be a way around the tight place
             plan = _least_stated(partial(at_dwell, free, tracked, unhindered, progress=progress), tracked, first)
             first = plan.minimum_dwell

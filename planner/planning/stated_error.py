@@ -255,8 +255,8 @@ def _mode_lags(vehicle: Vehicle, side: Integers, dwells: Floats) -> list[Floats 
     for index in (0, 1):
         tables = np.stack([vehicle.modes[p].lag[index] for p in with_lag], 2)  # type: ignore[index]
         lags[side == index] = interpolated(tables, before[side == index], dwells[side == index])
-    for place, p in enumerate(with_lag):
-        added[p] = lags[:, place]
+    for index, p in enumerate(with_lag):
+        added[p] = lags[:, index]
     return added
 
 

@@ -155,16 +155,16 @@ class MeasuredVehicle:
         values, spreads = self._values, [self.measured(name)[1] for name in _SPREADS]
         twist, lag, rest = self._motion(values)
         modes = []
-        for place, spread in enumerate(spreads):
+        for index, spread in enumerate(spreads):
             if spread > 0:
                 above, below = values.copy(), values.copy()
-                above[place] += spread
-                below[place] = (
-                    max(below[place] - spread, 0.0) if _SPREADS[place] == "lag" else below[place] - spread
+                above[index] += spread
+                below[index] = (
+                    max(below[index] - spread, 0.0) if _SPREADS[index] == "lag" else below[index] - spread
                 )
-                share = spread / (above[place] - below[place])
+                share = spread / (above[index] - below[index])
                 (up, up_lag, _), (down, down_lag, _) = self._motion(above), self._motion(below)
-                modes.append(Mode(_SPREADS[place], share * (up - down), share * (up_lag - down_lag)))
+                modes.append(Mode(_SPREADS[index], share * (up - down), share * (up_lag - down_lag)))
         return Vehicle(twist=twist, lag=lag, rest=rest, spread=np.zeros_like(rest), modes=tuple(modes))
 
     def _motion(self, values: Floats) -> tuple[Floats, Floats, Floats]:

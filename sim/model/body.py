@@ -65,8 +65,8 @@ class Body(NamedTuple):
     def with_resistance(self, entries: Mapping[tuple[int, int], Any]) -> Body:
         """Add `entries` (row, column) to the resistance of head and disc."""
         resistance = self.resistance.astype(np.result_type(self.resistance, *entries.values()))
-        for place, value in entries.items():
-            resistance[place] = resistance[place] + value
+        for index, value in entries.items():
+            resistance[index] = resistance[index] + value
         return self._replace(resistance=resistance)
 
 

@@ -20,7 +20,7 @@ from sim.mechanics import planar
 from sim.model.groups import Groups
 from sim.model.schedule import Schedule
 from sim.motion.run import COARSER, MOST_REPLAY_WORK, Resolution, SteppedRobot
-from sim.motion.segments import swum
+from sim.motion.segments import simulate_segments
 from sim.solve.assembly import bodies
 from sim.solve.march import YAW, X, Y
 
@@ -125,10 +125,11 @@ def stretches(
     for index, end in enumerate(ends.tolist()):
         marks = np.maximum.accumulate([now, *stops[dwell_of_stop == index], end])
         now = marks[-1]
+        # A dwell of length 0 keeps its stops, and has no steps.
         spans.append(
             np.diff(marks).tolist() if now > marks[0] else [0.0] * (len(marks) - 2) + [schedule.dwells[index]]
         )
-    simulated = swum(
+    simulated = simulate_segments(
         run,
         [[span for span in dwell if span > 0] for dwell in spans],
         progress or (lambda _: None),
@@ -143,14 +144,15 @@ def stretches(
                 f"the simulation failed in dwell {index + 1} of the schedule; a finer step may help"
             ) from None
         if index:
+            # The flip comes before the first part: `run` is handed out with the motor as it is in the stretch.
             run.flip()
-        for place, span in enumerate(dwell):
+        for part, span in enumerate(dwell):
             times, poses = _NONE, np.empty((0, 6))
             if span > 0:
                 times, poses, run.state = next(parts)
                 run.jumped = False
             direction = schedule.first_direction * (-1) ** index
-            yield SimulatedStretch(run, index, direction, now + times, poses, place < len(dwell) - 1)
+            yield SimulatedStretch(run, index, direction, now + times, poses, part < len(dwell) - 1)
             now += span
 
 

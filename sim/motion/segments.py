@@ -61,11 +61,11 @@ class _Segment(NamedTuple):
 
     def before(self, dwell: int) -> State:
         """Return the state before a dwell."""
-        place = dwell - self.first + self.early
-        return self.dwells[place - 1][-1].end if place else self.start
+        index = dwell - self.first + self.early
+        return self.dwells[index - 1][-1].end if index else self.start
 
 
-def swum(
+def simulate_segments(
     run: SteppedRobot, dwells: Dwells, progress: Callable[[int], object], *, exact: bool = False
 ) -> Iterator[list[Spell]]:
     """Simulate a schedule; yield the parts of each dwell, in order, up to one that fails.
@@ -121,13 +121,14 @@ def _agreeing(
     steps = np.array([sum(steps_in(part, run.time_step) for part in parts) for parts in dwells[begin:end]])
     count = _MULTIPLE * max(1, round(len(steps) / _MULTIPLE / _DWELLS))
     segments: list[_Segment] = []
-    for place, after in pairwise(_cuts(steps, count if len(steps) >= 6 * count else count // 2)):
-        first, last, early = begin + place, begin + after, 0
+    for low, high in pairwise(_cuts(steps, count if len(steps) >= 6 * count else count // 2)):
+        first, last, early = begin + low, begin + high, 0
         time = 0.0
         while segments and early < first - begin and (early < _LEAST_EARLY or time < _MEMORY):
             early += 1
             time += sum(dwells[first - early])
         segments.append(_Segment(first, last, early, run.state if segments else state))
+    # With one tail, or early dwells that reach behind the segment before, seams would not agree for long.
     too_short = (a.first - a.early < b.first - b.early for b, a in pairwise(segments))
     if run.state.x.shape[1] == 1 or any(too_short):
         print(f"{_IN_ORDER}, which takes longer", file=sys.stderr)
@@ -142,11 +143,13 @@ def _agreeing(
                 segments[k] = segment
                 tell(0 if number else (segment.end - segment.first) // 2)
         judged = _misfits(segments)
+        # Once a segment has to be simulated again, it is from a shape and a phase, so the phase must be right.
         exact = exact or any(apart >= _SAME for apart, _ in judged)
         todo = [
             k for k, (apart, off) in enumerate(judged, 1) if apart >= _SAME or (exact and abs(off) >= _SAME_PHASE)
         ]
         previous, largest = largest, max((apart for apart, _ in judged), default=0.0)
+        # Phases are handed on from segment to segment; a pass that does not bring them nearer will not end.
         if not todo or largest > max(previous / _LEAST_GAIN, _SAME):
             break
         for k in todo:
@@ -156,6 +159,7 @@ def _agreeing(
             segments[k] = later._replace(start=start)
     if todo:
         print(f"{_IN_ORDER} from dwell {segments[todo[0]].first + 1} on, which takes longer", file=sys.stderr)
+    # What follows a wrong segment begins in a wrong state, even where its own seam agrees.
     good = segments[: todo[0]] if todo else segments
     whole = [segment.covers(segment.end) for segment in good]
     return good[: whole.index(False)] if False in whole else good

@@ -67,9 +67,11 @@ def stepped_response(
         return lost
     run = SteppedRobot(reverse, tails, chosen, state, reverse=body)
     sense = float(np.sign(body.omega))
-    times, place = np.unique(np.minimum(dwells, settled), return_inverse=True)
+    # From `settled` on all dwells have one lag, which is stepped once.
+    times, index = np.unique(np.minimum(dwells, settled), return_inverse=True)
     _, turn = steady_twist(run, tails, sense)
     changes, after_short = [], []
+    # Two phases half a turn apart: their mean leaves out what changes sign from one to the other.
     for share in (0.0, 0.5):
         if run.failed:
             return lost
@@ -92,8 +94,8 @@ def stepped_response(
         memory = planar.compose(np.mean(after_short, 0), circle) - lag
         if from_rest.failed:
             return lost
-        rest, memory = rest[place], memory[:, place]
-    return Curves(lag[place], memory, rest, spread[place])
+        rest, memory = rest[index], memory[:, index]
+    return Curves(lag[index], memory, rest, spread[index])
 
 
 def _after_short_dwells(run: SteppedRobot, before: Floats, dwells: Floats, sense: float) -> Floats:

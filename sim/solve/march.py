@@ -118,6 +118,7 @@ def _march(
         going = with_lane(going, i, 1.0 if counts[i] > 0 else 0.0)
     begins, tau = going, dt
     while somewhere(going):
+        # A lane whose stage converged starts its next one; it waits for no other.
         if somewhere(begins):
             starts, flips = begins * (1 - second), none
             for i in range(len(w)):
@@ -135,15 +136,18 @@ def _march(
         correct(body, in_stage(1 / tau, star.pose[PHASE], star.x), state.x, u, work, True, going, dx, du)
         change = larger(largest_entry(dx), largest_entry(du) / (1 + abs(body.omega)))
         going = going * less(change, np.inf)
+        # Newton's method converges from afar if no node moves further than `limit` in a correction.
         share = choose(less(limit, change), limit / change, 1.0)
         move(body, state.x, share, dx, going)
         add_chosen(u, share, du, going)
         corrections = corrections + 1
         ends = going * less(change, tolerance)
+        # A lane out of corrections stops for good; its state stays that of the failed step.
         going = going * larger(ends, less(corrections, MOST_CORRECTIONS))
         begins = ends
         if somewhere(ends):
             _end_stage(body, state, star, tau, ends)
+            # A first stage of SDIRK2 ends no step: its second stage begins.
             second, ends = choose(ends, anew * (1 - second), second), ends * (1 - anew * (1 - second))
         for i in range(len(w)):
             if lane(ends, i) != 0:

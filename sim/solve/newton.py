@@ -204,6 +204,7 @@ def _solve_nonlocal(
     while count < _MOST_PRODUCTS and somewhere(going):
         direction = krylov.basis[count]
         step = FINITE_DIFFERENCE_STEP / larger(largest_entry(direction), 1e-12)
+        # The matrix times a direction is a central difference of the residual: effects have no derivatives.
         _displace(moved, x, u, step, scale, direction)
         fill_residual(body, rates, moved.x, moved.u, going, work.scratch, above.x, above.u)
         _displace(moved, x, u, -step, scale, direction)

@@ -324,11 +324,11 @@ def _record(
     """Keep the lags that lie in an accepted step of lane i, and the shape if the step ends at a mark."""
     robot, begin, end = progress.robot[i], lane(now, i), lane(new_now, i)
     while progress.steps[i] > 1 and progress.places[i] < len(times) and times[progress.places[i]] <= end:
-        place = progress.places[i]
-        share = (times[place] - begin) / (end - begin)
+        index = progress.places[i]
+        share = (times[index] - begin) / (end - begin)
         for p in range(new.lag.shape[0]):
             for c in range(3):
-                found.lag[robot, place, p, c] = between(
+                found.lag[robot, index, p, c] = between(
                     share, end - begin, lane(at.lag[p, c], i), lane(new.lag[p, c], i),
                     lane(at.lag_rate[p, c], i), lane(new_rate[p, c], i),
                 )  # fmt: skip

@@ -182,19 +182,19 @@ function listed(text) {
 class History {
   constructor(state) {
     this.states = [state];
-    this.place = 0;
+    this.index = 0;
   }
 
   get state() {
-    return this.states[this.place];
+    return this.states[this.index];
   }
 
   /* Take a new state. Changes with the same `kind`, such as moves of one slider, are one step. */
   change(state, kind = null) {
     if (JSON.stringify(state) === JSON.stringify(this.state)) return false;
-    const kept = kind !== null && kind === this.kind ? this.place : this.place + 1;
+    const kept = kind !== null && kind === this.kind ? this.index : this.index + 1;
     this.states = [...this.states.slice(0, kept), state].slice(-MOST_STEPS - 1);
-    this.place = this.states.length - 1;
+    this.index = this.states.length - 1;
     this.kind = kind;
     return true;
   }
@@ -206,11 +206,11 @@ class History {
 
   /* Whether a step back (-1) or on (1) is possible. */
   has(step) {
-    return this.place + step in this.states;
+    return this.index + step in this.states;
   }
 
   move(step) {
-    if (this.has(step)) this.place += step;
+    if (this.has(step)) this.index += step;
     this.settle();
   }
 }

@@ -302,7 +302,7 @@ class Rungs:
         )
 
     def plan(self, *, longer: bool = True, **options: Any) -> Any:
-        task = solve.PathTask(source=lambda _: 1 / 0, longer=longer)
+        task = solve.PathTask(source=lambda _: 1 / 0, try_longer=longer)
         return solve.solve(task, tracked(), PlanRequest(objective="flips", **options))
 
 
@@ -365,11 +365,11 @@ def test_a_lap_with_too_few_flips_to_be_corrected_is_refused() -> None:
 
 
 def test_a_schedule_too_short_for_its_path_is_an_error_of_the_planner(monkeypatch: pytest.MonkeyPatch) -> None:
-    follow = line_of_sight.follow_some
+    follow = line_of_sight.follow_dwells
 
     def stopped(*arguments: Any) -> Any:
         return follow(*arguments)._replace(ended=True, done=1)
 
-    monkeypatch.setattr(line_of_sight, "follow_some", stopped)
+    monkeypatch.setattr(line_of_sight, "follow_dwells", stopped)
     with pytest.raises(RuntimeError, match="error of the planner"):
         plan(circle(2.0), CONTROL, objective="flips")
