@@ -8,8 +8,8 @@ point nearer to the place than the circle at constant direction, whose radius is
     R = sqrt(R′² + b²),   R′ the pivot's turn radius, b the distance from the pivot to the tracked point.
 
 With the lags of the flips the same holds for all pairs of dwells that the tests try. That circle cannot be
-corrected to the inside. The orbit that is held is somewhat wider: its pivot uses CURVED of the largest curvature,
-so that flips correct it in both directions. It repeats until told otherwise. Lengths in l.
+corrected to the inside. What is planned is a somewhat wider one, in laps: its pivot uses CURVED of the largest
+curvature, so that flips correct it in both directions. Lengths in l.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -26,23 +26,18 @@ from common.keywords import checks_keywords
 from common.units import format_time
 from planner.jobs.plan import make_plan
 from planner.options import AnyVehicle, JobOptions, asked, place_of, seconds_of
-from planner.paths.obstacles import Footprint, FreeSpace
+from planner.paths.obstacles import FreeSpace
 from planner.paths.path import Path2D, circle
 from planner.paths.units import in_lab, place_in_lab
 from planner.planning.plan import Job, Plan
-from planner.vehicle.vehicle import roll_out
-from sim.mechanics.planar import POSE
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-FORMAT = 1
+FORMAT = 2  # of hold.json
 CURVED = 0.84  # below the share up to which a path is followed as it was drawn
 
 
 @dataclass(frozen=True)
 class Orbit(Job):
-    """An orbit about a place. Lengths in l, times in μ0 l⁴/EI.
+    """An orbit about a place. Lengths in l.
 
     Example:
         >>> import softflagella as sf
@@ -53,11 +48,8 @@ class Orbit(Job):
 
     place: tuple[float, float]  # that is held
     radius: float  # of the orbit of the tracked point
-    reach: float  # largest distance of any part of the body from the place, on the orbit
-    laps: int | None  # whole laps that take the time that was asked for, or more; None: until told otherwise
     smallest: float  # radius of the tracked point's smaller circle: no schedule stays nearer
-    still_direction: int  # of the motor, on that circle
-    still_start: POSE  # at rest, from where that circle is about the place
+    laps: int | None  # whole laps that take the time that was asked for, or more; None: until told otherwise
 
     kind = "hold"
 
@@ -65,60 +57,28 @@ class Orbit(Job):
         """Return the distance from the place within which the tracked point stays with feedback."""
         return self.radius + plan.feedback_error
 
-    def within_open_loop(self, plan: Plan, laps: int) -> float:
-        """Return the distance within which the tracked point stays for some laps without feedback."""
-        assert plan.lap is not None
-        return self.radius + plan.stated_error + (laps - 1) * plan.lap.drift
-
     def lines(self, plan: Plan) -> list[str]:
         """Say how near the robot stays."""
-        robot = plan.robot
-        radius, smallest, within, reach = (
-            in_lab(value, robot) for value in (self.radius, self.smallest, self.within(plan), self.reach)
+        radius, smallest, within = (
+            in_lab(value, plan.robot) for value in (self.radius, self.smallest, self.within(plan))
         )
-        x, y, heading = self.still_start
-        lap = format_time(plan.duration * robot.time_scale)
-        lines = [
-            f"orbit of radius {radius} about {place_in_lab(*self.place, robot)}, a lap in {lap}; with feedback "
-            f"within {within}, the body within {reach}; no schedule stays nearer than {smallest}"
+        laps = "" if self.laps is None else f"{self.laps} laps, "
+        lap, about = format_time(plan.duration * plan.robot.time_scale), place_in_lab(*self.place, plan.robot)
+        return [
+            f"orbit of radius {radius} about {about}, {laps}each {lap}; with feedback within {within}; "
+            f"no schedule stays nearer than {smallest}"
         ]
-        if self.laps is not None:
-            without = in_lab(self.within_open_loop(plan, self.laps), robot)
-            lines.append(f"{self.laps} laps; without feedback within {without} for so long")
-        lines.append(
-            f"without a camera, from {place_in_lab(x, y, robot)} with heading {math.degrees(heading):.0f} degrees "
-            f"and the motor always at {self.still_direction:+d}: a circle of radius {smallest} about the place, "
-            "which only a current moves"
-        )
-        return lines
-
-    def title(self, plan: Plan) -> str:
-        """Name the distance from the place."""
-        return f"with feedback within {in_lab(self.within(plan), plan.robot)}"
-
-    def draw(self, axes: Axes, plan: Plan) -> None:
-        """Draw the place, and what the body reaches."""
-        cm = 100 * plan.robot.length_scale
-        x, y = cm * np.array(self.place)
-        angle = np.linspace(0, 2 * math.pi, 200)
-        reach = cm * self.reach
-        axes.plot(x, y, "+", color="#c8452f", ms=8, label="place")
-        axes.plot(x + reach * np.cos(angle), y + reach * np.sin(angle), ":", color="0.5", lw=1, label="body")
 
     def to_dict(self, plan: Plan) -> dict[str, Any]:
-        """Return the content of hold.json. Lengths in l, times in seconds, angles in rad."""
+        """Return the content of hold.json. Lengths in l, times in seconds."""
         return {
             "format": FORMAT,
             "place": list(self.place),
             "radius_over_l": self.radius,
             "smallest_over_l": self.smallest,
             "within_over_l": self.within(plan),
-            "reach_over_l": self.reach,
             "lap_s": plan.duration * plan.robot.time_scale,
             "laps": self.laps,
-            "within_open_loop_over_l": None if self.laps is None else self.within_open_loop(plan, self.laps),
-            "still_start": list(self.still_start),
-            "still_direction": self.still_direction,
         }
 
 
@@ -157,6 +117,7 @@ def hold(
     current = math.hypot(*vehicle.current.tolist()) / vehicle.speed
     radius = math.hypot(vehicle.pivot_radius * (1 + current) / CURVED, tracked.rod)
     orbit = Path2D.of(circle(radius).points + np.array([x, y]), closed=True)
+    # Without obstacles: a way around one would leave the place.
     plan = make_plan(orbit, tracked, replace(request, loop=True, space=FreeSpace()), options.get("progress"))
     if not space.empty and (clearance := plan.clearance(space)) < plan.margin_needed:
         raise InputError(
@@ -164,14 +125,7 @@ def hold(
             f"{in_lab(max(clearance, 0.0), swims)} of an obstacle and needs {in_lab(plan.margin_needed, swims)}; "
             "move the place"
         )
-    body = Footprint.of(swims, 0.0)
-    centres = body.centres(roll_out(vehicle, plan.switches).poses) - [x, y]
-    reach = float((centres**2).sum(-1).max() ** 0.5) + body.radius
+    forward, left, rate = vehicle.twist.T
+    smallest = float((np.hypot(forward, left + rate * tracked.offset) / np.abs(rate)).min())
     laps = None if duration is None else math.ceil(duration / (plan.duration * swims.time_scale))
-    twists = [(direction, *twist) for direction, twist in zip((1, -1), vehicle.twist.tolist(), strict=True)]
-    smallest, still, (forward, left, rate) = min(
-        (math.hypot(forward, left + rate * tracked.offset) / abs(rate), -direction, (forward, left, rate))
-        for direction, forward, left, rate in twists
-    )
-    start = x + left / rate, y - forward / rate, 0.0
-    return plan.with_job(Orbit((x, y), radius, reach, laps, smallest, -still, start))
+    return plan.with_job(Orbit((x, y), radius, smallest, laps))
