@@ -157,7 +157,7 @@ def _measured(samples: pd.DataFrame, table: pd.DataFrame, y_down: bool, robot: R
     known = [c for c in columns if columns[c].notna().any()]
     if not known:
         raise InputError(f"no track gives a number{f' ({aside[0]})' if aside else ''}; check the tracks")
-    # Checks need all runs: one wrong sense may be an error of the table, many are one of the camera.
+    # One wrong sense may be an error of a row; all of them are one of the camera.
     _check_senses(table, columns, y_down)
     if robot is not None:
         _check_motion(robot, table, columns)

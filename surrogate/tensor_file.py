@@ -63,7 +63,7 @@ def read(path: str | Path, version: int, remedy: str) -> dict[str, Any]:
         found_version, written, plain = manifest["format"], manifest["hash"], manifest["content"]
     except (SafetensorError, KeyError, TypeError, ValueError, RecursionError, OverflowError, AttributeError):
         raise InputError(f"{path} is not a model file, or is damaged; {remedy}") from None
-    # The version comes before the hash: a file of another version is whole, and needs another remedy.
+    # The version comes before the hash: a file of another version was not changed.
     if found_version != version:
         raise InputError(f"{path} has format {str(found_version)[:20]}, this version reads {version}; {remedy}")
     try:

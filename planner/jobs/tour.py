@@ -183,7 +183,7 @@ class _Tour(NamedTuple):
     def ordered(self, travel: Travel, progress: ProgressCallback | None) -> _Ordered:
         """Find the order, and refine the directions of motion."""
         count = len(self.places)
-        # Obstacles make times estimates, and an order on estimates is proven for nothing.
+        # Among obstacles times are estimates, which prove nothing of an order.
         exact = count - (not self.any_start) <= EXACT and travel.limits.space.empty
         options = COURSES if exact else FEWER_COURSES
         courses = 2 * math.pi * np.arange(options) / options
@@ -200,7 +200,7 @@ class _Tour(NamedTuple):
         costs = travel.times(np.repeat(flat, len(flat), 0), np.tile(flat, (len(flat), 1)), progress)
         costs = costs.reshape(count, options, count, options)
         closing = costs.min(-1).transpose(2, 0, 1) if self.back else np.zeros((count, count, options))
-        # A given start has no choice of course: its row is the start's cost, and it is left out of the order.
+        # A given first place is not in the order: the way from it, with its best course, is the cost of a start.
         if self.any_start:
             first, start, end = 0, np.where(free, 0.0, np.inf), closing if self.back else closing[0]
         else:

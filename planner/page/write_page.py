@@ -208,7 +208,7 @@ def _planner_data(lookup: LookupTable, robot: Robot, tracked: TrackedVehicle, wh
             ],
             "before": curves.before,
             "phaseRate": vehicle.phase_rate.tolist(),
-            # A steady error has no curves; two tables of zeros would be half of the page's data.
+            # A steady error has no curves, and tables of zeros need not be on the page.
             "errors": [
                 {"twist": twist.tolist(), "lag": lag, "memory": memory}
                 if lag.any() or memory.any()

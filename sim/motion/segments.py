@@ -128,7 +128,7 @@ def _agreeing(
             early += 1
             time += sum(dwells[first - early])
         segments.append(_Segment(first, last, early, run.state if segments else state))
-    # With one tail, or early dwells that reach behind the segment before, seams would not agree for long.
+    # With one tail the phase matters too much; early dwells that begin before the last segment have no partner.
     too_short = (a.first - a.early < b.first - b.early for b, a in pairwise(segments))
     if run.state.x.shape[1] == 1 or any(too_short):
         print(f"{_IN_ORDER}, which takes longer", file=sys.stderr)
