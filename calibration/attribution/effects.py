@@ -104,31 +104,30 @@ def examine(
     title = " ".join(("effects", *(f"beside {e.title}" for e in beside)))
     order = np.argsort(-np.abs(misfit.scores.z)).tolist()
     for j in tqdm(order, desc=title, unit="effect", delay=1.0, disable=not study.progress or None):
-        candidate = candidates[j]
-        if candidate.reason is not Reason.NOT_NEEDED:
-            examined.append(candidate)
-            continue
-        if skipped(f"a second effect beside {beside[0].title}" if beside else candidate.effect.title):
-            examined.append(replace(candidate, reason=Reason.NO_TIME))
-            continue
-        began = clock()
-        try:
-            refit = _fitted(study, base, candidate, float(misfit.second[j]), local=local)
-        except UnsolvedError:
-            examined.append(replace(candidate, reason=Reason.NOT_SOLVED))
-            continue
-        measures = measures_of(study, base, directions.without(j))
-        examined.append(judge(replace(candidate, fit=refit), replace(trial, measures=measures), RULES))
-        if after_first:
-            after_first(wanted, clock() - began)
-            after_first = None
+        candidate, began = candidates[j], clock()
+        if candidate.reason is Reason.NOT_NEEDED:
+            candidate = _fitted(study, base, candidate, float(misfit.second[j]), local=local)
+            if candidate.fit:
+                measures = measures_of(study, base, directions.without(j))
+                candidate = judge(candidate, replace(trial, measures=measures), RULES)
+            if candidate.fit and after_first:
+                after_first(wanted, clock() - began)
+                after_first = None
+        examined.append(candidate)
     return examined
 
 
-def _fitted(study: Study, base: Fit, candidate: Hypothesis, second: float, *, local: bool) -> Fit:
-    """Fit an effect from where its score points to, or from the model as given where scores say nothing."""
-    effect, expected = candidate.effect, candidate.evidence.expected
+def _fitted(study: Study, base: Fit, candidate: Hypothesis, second: float, *, local: bool) -> Hypothesis:
+    """Fit an effect from where its score points to, or from the model as given where scores say nothing.
+
+    Args:
+        second: value of its second number at its score.
+        local: whether scores say something.
+    """
+    effect, expected, beside = candidate.effect, candidate.evidence.expected, candidate.added[:-1]
     assert expected is not None
+    if skipped(f"a second effect beside {beside[0].title}" if beside else effect.title):
+        return replace(candidate, reason=Reason.NO_TIME)
     guess = expected if local else effect.start
     size = {effect.name: min(max(guess, effect.bounds[0]), effect.bounds[1])}
     if effect.second is not None:
@@ -136,7 +135,11 @@ def _fitted(study: Study, base: Fit, candidate: Hypothesis, second: float, *, lo
     start = {**(base.parameters if local else start_values(study.model)), **size}
     names = (*base.names, *size)
     target = study.noise_at_most(len(names))
-    return fit(study.model, start, names, study.split.fitted, target=target, title="")
+    try:
+        refit = fit(study.model, start, names, study.split.fitted, target=target, title="")
+    except UnsolvedError:
+        return replace(candidate, reason=Reason.NOT_SOLVED)
+    return replace(candidate, fit=refit)
 
 
 def measures_of(study: Study, base: Fit, others: Directions) -> dict[str, Callable[[Hypothesis], Any]]:

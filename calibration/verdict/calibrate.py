@@ -116,40 +116,52 @@ def calibrate(
     # A number that differs is stated as all runs show it, the held-out ones included.
     with_moves, moves = (of_all, moves) if of_all else (found.base, found.moves)
     found = replace(found, moves=tuple(replace(move, fit=with_moves) for move in moves))
-    errors = _errors(study, found, uncalibrated, laws)
-    rivals = _rivals(study, found, laws)
-    base_intervals, final_intervals = _both_intervals(study, found, progress=progress)
-    found = replace(found, forms=forms_in_question(study, found))
-    refit = final_refit(of_all) if of_all else _handed_on(study, found, errors)
-    fixed = {
-        "level": level,
-        "seed": seed,
-        "catalogue": [e.name for e in model.effects],
-        "locked": study.split.names,
-    }
+    catalogue = [e.name for e in model.effects]
     return verdict(
+        **_concluded(study, found, uncalibrated, laws, final_refit(of_all) if of_all else None),
+        **_given(given),
         verdict=found.verdict(level),
         runs=model.runs,
-        split=study.split,
-        found=found,
         differences=differences,
-        errors=errors,
-        base_intervals=base_intervals,
-        final_intervals=_over_forms(study, found, final_intervals),
-        pulls=pulls(found.final, study.model.nuisances),
-        final_refit=refit,
-        law=laws,
-        explanations=tuple(map(Explanation.of, rivals)),
-        **_next_runs(rivals, seed),
-        numbers=tuple(p.name for p in (*given.coefficients, *given.nuisances)),
-        catalogue=tuple(e.name for e in given.effects),
-        untestable=dict(model.untestable),
         draws=draws,
-        fixed_before=fingerprint(fixed),
-        little_weight=rows_of_little_weight(study),
+        fixed_before=fingerprint(
+            {"level": level, "seed": seed, "catalogue": catalogue, "locked": study.split.names}
+        ),
         not_tried=tuple(budget.not_tried),
         caveats=_caveats(study, model, found, budget.not_tried, beside),
     )
+
+
+def _concluded(
+    study: Study, found: Attribution, uncalibrated: Floats, laws: Description | None, refit: FinalRefit | None
+) -> dict[str, Any]:
+    """Open the held-out test, and collect what follows from what was found; `refit`, if it is known already."""
+    errors = _errors(study, found, uncalibrated, laws)
+    rivals = _rivals(study, found, laws)
+    base_intervals, final_intervals = _both_intervals(study, found)
+    found = replace(found, forms=forms_in_question(study, found))
+    return {
+        "split": study.split,
+        "found": found,
+        "errors": errors,
+        "base_intervals": base_intervals,
+        "final_intervals": _over_forms(study, found, final_intervals),
+        "pulls": pulls(found.final, study.model.nuisances),
+        "final_refit": refit or _handed_on(study, found, errors),
+        "law": laws,
+        "explanations": tuple(map(Explanation.of, rivals)),
+        **_next_runs(rivals, study.seed),
+        "little_weight": rows_of_little_weight(study),
+    }
+
+
+def _given(model: Experiment) -> dict[str, Any]:
+    """Name what a model has of its own, and what its runs cannot test."""
+    return {
+        "numbers": tuple(p.name for p in (*model.coefficients, *model.nuisances)),
+        "catalogue": tuple(e.name for e in model.effects),
+        "untestable": dict(model.untestable),
+    }
 
 
 def _unexplained(study: Study, found: Attribution) -> bool:
@@ -183,9 +195,9 @@ def _rivals(study: Study, found: Attribution, laws: Description | None) -> tuple
     return tuple(replace(rival, fit=fit) for rival, fit in zip(rivals, fits, strict=True))
 
 
-def _both_intervals(study: Study, found: Attribution, *, progress: bool) -> tuple[Intervals, Intervals]:
+def _both_intervals(study: Study, found: Attribution) -> tuple[Intervals, Intervals]:
     """Compute the 95 % intervals of the calibrated model, and of the final one."""
-    title = "intervals" if progress else ""
+    title = "intervals" if study.progress else ""
     base = final = _intervals(found.base, study.split.fitted, title)
     if found.final is not found.base:
         final = _intervals(found.final, study.split.fitted, title)
