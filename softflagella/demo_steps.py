@@ -74,16 +74,15 @@ def _calibration(name: str, about: str) -> Step:
     )
 
 
-def _again(robot: str) -> tuple[str, ...]:
+def _again(model: str, robot: str) -> tuple[str, ...]:
     """Plan the square for a model of the robot, and let the robot behind the runs carry the plan out."""
-    folder = f"again/{Path(robot).stem}"
     return (
-        f"plan square:3l --robot {robot} --own-table --out {folder}",
-        f"replay {folder}/plan.json --robot truth.toml --out {folder}/track.csv --no-error",
+        f"plan square:3l --robot {robot} --own-table --out again/{model}",
+        f"replay again/{model}/plan.json --robot truth.toml --out again/{model}/track.csv --no-error",
     )
 
 
-_TRACKS = [f"again/{model}/track.csv" for model in ("truth", "corrected", "given")]
+_TRACKS = [f"again/{model}/track.csv" for model in ("truth", "corrected", "fitted")]
 CHAINS = (
     (
         Step(
@@ -162,12 +161,13 @@ CHAINS = (
         ),
         Step(
             "Planning again: what the correction is worth",
-            "A square, planned with the robot behind the runs, with the corrected one and with the one as given, "
-            "and swum open loop by the first.",
+            "A square, planned with the robot behind the runs, with the corrected one, and with one whose "
+            "coefficients alone were fitted, without a search for effects; and swum open loop by the first.",
             (
-                *_again("truth.toml"),
-                *_again("hidden-effect/corrected.toml"),
-                *_again("given.toml"),
+                "calibrate hidden-effect/runs.csv --robot given.toml --max-seconds 0.01 --no-path --out fitted",
+                *_again("truth", "truth.toml"),
+                *_again("corrected", "hidden-effect/corrected.toml"),
+                *_again("fitted", "fitted/corrected.toml"),
                 f"compare {' '.join(_TRACKS)} --plot again/tracks.png",
             ),
             {"truth.toml": "the robot behind the runs", **dict.fromkeys(_TRACKS, "a track")},
