@@ -63,6 +63,11 @@ def test_a_change_without_a_robot_is_refused(words: str) -> None:
         main([*words.split(), "--set", "motor.speed_rpm=4"])
 
 
+def test_a_preset_that_there_is_not_is_named_as_it_was_typed(robot: Path) -> None:
+    with pytest.raises(InputError, match="no preset 'thin'; there are"):
+        main(["robot", "thin", "--set", "motor.speed_rpm=4", "--out", "thin.toml"])
+
+
 def test_a_robot_is_written_with_its_changes_and_only_then(robot: Path) -> None:
     changes = ["--set", "fluid.viscosity_mPa_s=700", "--set", "effects.end_over_end_drag=5", "--set", "name=thin"]
     main(["robot", "paper-control", *changes, "--out", "thin.toml"])
