@@ -3,10 +3,10 @@
 The table states its own errors. Its curves are simulated once more with coarser meshes and four times the
 tolerance. On a dozen robots, compared with finer meshes and a fifth of the tolerance, the error was 0.1 to 0.3 of
 the difference, of nearly the same shape (`_ALONG`, `_ACROSS`). What the last dwell but one changes is not in the
-curves. It is a share of speed and yaw rate that fades with the last dwell S: of 60 robots with 2 to 5 tails, 95 %
-are below twice
+curves. Over speed and yaw rate it falls with the motor speed and with the last dwell S: of 60 robots with 2 to 5
+tails, 95 % are below twice
 
-    _LONGER exp((0.2 − S)/_FADES)
+    a ω̄^−p exp(−_FADES S),   (a, p) by axis in _LONGER
 
 which counts as the standard deviation of an error.
 
@@ -43,7 +43,7 @@ _STEP = 0.02  # in the logarithm of a group and in units of an effect's typical 
 TOLERANCE = 1e-4  # of a time step of the curves, in l
 _COARSE_TOLERANCE, _COARSE_MESHES = 4 * TOLERANCE, (4, 6)  # of the curves that show the error
 _ALONG, _ACROSS = 0.25, 0.1  # standard deviation of the error over the difference, along it and across
-_LONGER, _FADES = 4e-3, 0.135  # share of speed and yaw rate, time units
+_LONGER, _FADES = ((1.5, 1.6), (3.0, 2.3), (0.5, 1.5)), 8.6  # forward, to the side, heading; per time unit
 _BOUND = 1.96  # standard deviations; the simulator's error of the steady motion holds in 95 % of the robots
 _CHECKED = 24  # dwells of the random schedule
 _RANGE = (0.35, 1.8)  # of their lengths
@@ -128,16 +128,22 @@ def _curve_errors(
     if response.stepped.any() or coarse.stepped.any() or coarse.failed.any():
         return None, np.zeros(3)
     difference = _curves(coarse)[0] - _curves(response)[0]
-    modes, longer = np.zeros((6, *difference.shape)), longer_memory(BEFORE)
+    modes, longer = np.zeros((6, *difference.shape)), longer_memory(BEFORE, abs(float(groups.omega_bar[0])))
     for axis in range(3):
         modes[axis, ..., axis] = _ALONG * difference[..., axis]
-        modes[3 + axis, :-1, :, axis] = longer[:, None] * speeds[axis]
+        modes[3 + axis, :-1, :, axis] = longer[:, axis, None] * speeds[axis]
     return modes, _ACROSS * np.sqrt((difference**2).mean((0, 1)))
 
 
-def longer_memory(before: Floats) -> Floats:
-    """Return what the last dwell but one changes after equal dwells, one standard deviation over the speeds."""
-    return np.asarray(_LONGER * np.exp((BEFORE[0] - before) / _FADES))
+def longer_memory(before: Floats, omega_bar: float) -> Floats:
+    """Return one standard deviation (K, 3), over the speeds, of what the last dwell but one changes.
+
+    Args:
+        before: length of both dwells before, (K,).
+        omega_bar: motor speed, above 0.
+    """
+    sizes = np.array([size * omega_bar**-power for size, power in _LONGER])
+    return np.asarray(sizes * np.exp(-_FADES * before)[:, None])
 
 
 def _curves(response: Responses) -> Floats:

@@ -163,8 +163,8 @@ def test_what_flips_that_go_on_leave_of_the_curves_is_below_what_a_table_states(
     twist = twists(motion.v_z, motion.v_x, motion.omega_yr, np.ones(1))
     lag = curves.lag + at_equal_dwells(curves.memory)
     off = abs(planar.net_speed(twist[:, None], lag, DWELLS)[0, few] - stepped)
-    stated = longer_memory(DWELLS[few]) * np.hypot(twist[0, 0], twist[0, 1]) / DWELLS[few]
-    stated *= np.sqrt(2)  # two errors, forward and to the side, in each dwell
+    forward, aside, _ = longer_memory(DWELLS[few], omega_bar).T
+    stated = np.hypot(forward, aside) * np.hypot(twist[0, 0], twist[0, 1]) / DWELLS[few]
     assert (off < 2 * stated).all()
 
 
