@@ -88,11 +88,6 @@ class Budget:
     not_tried: dict[str, str] = field(default_factory=dict)
 
     @property
-    def left(self) -> Work:
-        """Work that is left."""
-        return self.end - work_done()
-
-    @property
     def interrupted(self) -> bool:
         """Whether Ctrl-C has ended the search."""
         return self.end.predictions == -math.inf
@@ -128,11 +123,11 @@ def beginning() -> Work:
 
 def work_left() -> Work:
     """Return the work that may still be done; infinite without a limit."""
-    left = [budget.left for budget in _BUDGETS.get()]
-    return Work(
-        min((each.predictions for each in left), default=math.inf),
-        min((each.seconds for each in left), default=math.inf),
-    )
+    ends = [budget.end for budget in _BUDGETS.get()]
+    predictions = min((end.predictions for end in ends), default=math.inf)
+    seconds = min((end.seconds for end in ends), default=math.inf)
+    # To read the processor's clock may take a millisecond.
+    return Work(predictions - _PREDICTED.get(), seconds - clock() if seconds < math.inf else seconds)
 
 
 def seconds_left(since: Work) -> float:

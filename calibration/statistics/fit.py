@@ -483,8 +483,11 @@ def _descend(problem: _Problem, point: _Point, target: float) -> tuple[_Point, F
         if in_valley:
             step = problem.bent(point, share, step)
         short = not in_valley and bool(np.abs(step.change).max() <= _SHORT)
-        tried = problem.at(step.parameters, point.derivative if short else None, count + 1)
+        doubtful = not short and (refused or not solved)  # its derivatives follow where it is not refused as well
+        tried = problem.at(step.parameters, point.derivative if short or doubtful else None, count + 1)
         fall = float(normal[-1, -1] - problem.normal(tried, share)[-1, -1])
+        if doubtful and tried.solved and fall > -small:
+            tried = problem.at(step.parameters, None, count + 1)
         solved = solved and tried.solved
         if tried.solved and fall > -small:
             # A step that keeps little of its promise overshoots, and the next one is damped (Marquardt 1963).

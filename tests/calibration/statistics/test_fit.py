@@ -498,3 +498,22 @@ def test_steps_that_are_refused_one_after_another_get_shorter_faster() -> None:
     fitted = fit(model, {"v1": 100.0, "wall": 0.0}, ("v1",), np.ones(len(model.runs.y), dtype=bool), title="")
     assert 100.0 <= fitted.parameters["v1"] <= 102.5
     assert len(set(tried)) < 20
+
+
+def test_derivatives_follow_predictions_where_the_model_could_not_be_solved(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """They cost several predictions, and where a step is refused nobody needs them."""
+    refused = []
+
+    def noted(model: Any, at: Any, names: Sequence[Any], **options: Any) -> tuple[Floats, Floats]:
+        prediction, table = derivatives(model, at, names, **options)
+        if not np.isfinite(prediction).all():
+            refused.append(len(names))
+        return prediction, table
+
+    monkeypatch.setattr("calibration.statistics.fit.derivatives", noted)
+    model = hand_made(change=lambda y, sets: np.where(float(sets[0]["v1"]) > 102.5, np.nan, y))
+    fit(model, {"v1": 100.0, "wall": 0.0}, ("v1",), np.ones(len(model.runs.y), dtype=bool), title="")
+    assert len(refused) > 2
+    assert sum(refused) <= 1
