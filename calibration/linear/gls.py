@@ -240,9 +240,14 @@ class NormalEquations:
     def estimated(self) -> Flags:
         """Axes (..., k) of which ρ is estimated: a fit at ρ = 0 leaves their means about the common one free."""
         columns = self._about_common(self.means)[..., :-1]
-        covariance = solve_normal(self.at(0.0))[1]
+        covariance = self._without_scatter[1]
         taken = ((columns @ covariance) * columns).sum(-1)
         return np.asarray(len(self.sizes) - 1 - self._of_outputs(taken) > _LEAST_FREEDOM)
+
+    @cached_property
+    def _without_scatter(self) -> tuple[Floats, Floats]:
+        """Solve for the coefficients (..., p) at ρ = 0; with their covariance (..., p, p)."""
+        return solve_normal(self.at(0.0))
 
     def _of_outputs(self, means: Floats) -> Floats:
         """Add up what is stated for each session and output (..., s k), to (..., k)."""
@@ -291,8 +296,8 @@ class NormalEquations:
             return share
         means, total = self._about_common(self.means), self.sizes.sum()
         columns = means[..., :-1]
-        for _ in range(passes if freedom else 0):
-            step, covariance = solve_normal(self.at(share))
+        for count in range(passes if freedom else 0):
+            step, covariance = solve_normal(self.at(share)) if count else self._without_scatter
             between = (means[..., -1] - (columns @ step[..., None])[..., 0]) ** 2
             used = ((columns @ covariance) * columns).sum(-1) * self._weights(share)
             each, taken = self._of_outputs(between), self._of_outputs(used)
