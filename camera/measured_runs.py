@@ -28,7 +28,7 @@ from camera.track_options import TrackOptions
 from common.arrays import Floats
 from common.errors import InputError, naming
 from common.quantities import convert_columns, numbers_of
-from common.run_columns import OUTPUTS, RUN, RUN_SYNONYMS, check_factor
+from common.run_columns import MEASURED, RUN, RUN_SYNONYMS, check_factor
 from common.tables import read_table, row_name
 from sim.inputs import run_columns
 from sim.model.robot import Robot
@@ -307,7 +307,7 @@ def _check_motion(robot: Robot, runs: pd.DataFrame, measured: pd.DataFrame) -> N
     swimmers, columns = run_columns(settings[usable], robot, "the runs")
     simulated = lab_motion(swimmers, steady_columns(columns, stability=False))
     for output in ("omega_yr", "R_yr", "theta", "v"):
-        column = OUTPUTS[output][0]
+        column = MEASURED[output].column
         factors = np.abs(measured[column][usable].to_numpy(dtype=float) / simulated[column])
         if np.isfinite(factors).any():
             check_factor(output, float(np.nanmedian(factors)))

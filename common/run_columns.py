@@ -52,14 +52,11 @@ RUN_COLUMNS = (
     *RUN, *(column for column, _, _ in MEASURED.values()), "run", "trial", "session", "robot", *RUN_NOTES,
     *RUN_ERRORS, *RUN_SIGMAS,
 )  # fmt: skip
-# Output -> (column, factor to SI, sign relative to the motor's; 0: a magnitude)
-OUTPUTS = {
-    output: (column, to_si(1.0, column.removeprefix(f"{output}_")), sign)
-    for output, (column, sign, _) in MEASURED.items()
-}
+_UNITS = {output: column.removeprefix(f"{output}_") for output, (column, _, _) in MEASURED.items()}
+TO_SI = {output: to_si(1.0, unit) for output, unit in _UNITS.items()}  # factor
+OTHER_UNITS = {output: other_units(unit) for output, unit in _UNITS.items()}
 _NEAR = 1.6  # factor between an output in another unit and what the robot does
 OFF = 10 / _NEAR  # factor of an output: of what is ten times too large or too small
-OTHER_UNITS = {name: other_units(column.removeprefix(f"{name}_")) for name, (column, _, _) in OUTPUTS.items()}
 
 
 def convert_measured(table: pd.DataFrame, where: str) -> Converted:
@@ -74,7 +71,7 @@ def convert_measured(table: pd.DataFrame, where: str) -> Converted:
     for name in RUN:  # before the others: a table without them is no measured table
         if name not in table:
             raise InputError(f"the table has no column {name!r}; it needs {', '.join(RUN)}")
-    outputs = (column for column, _, _ in OUTPUTS.values())
+    outputs = (column for column, _, _ in MEASURED.values())
     table, others = convert_columns(table, (*outputs, *RUN_NOTES, *RUN_SIGMAS), where, RUN_SYNONYMS)
     for name in (str(c) for c in table if c not in RUN_COLUMNS):
         near = difflib.get_close_matches(name, [column for column in RUN_COLUMNS if column not in table], n=1)
@@ -84,7 +81,7 @@ def convert_measured(table: pd.DataFrame, where: str) -> Converted:
 
 
 def check_factor(output: str, factor: float, otherwise: str = "") -> None:
-    """Check the ratio of an output, a name of OUTPUTS, to the prediction of the model as given.
+    """Check the ratio of an output, a name of MEASURED, to the prediction of the model as given.
 
     Args:
         otherwise: what else may be wrong, for the end of the message.
@@ -92,7 +89,7 @@ def check_factor(output: str, factor: float, otherwise: str = "") -> None:
     Raises:
         InputError: the output seems to be in another unit.
     """
-    column = OUTPUTS[output][0]
+    column = MEASURED[output].column
     if unit := guess_slip(factor, OTHER_UNITS[output], _NEAR):
         raise InputError(
             f"{column} is {factor:.3g} times what the robot as given does: it seems to be in {unit}; "

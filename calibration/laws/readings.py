@@ -211,7 +211,7 @@ def motion_patterns(
 
     Args:
         inputs: ln ω, ln l, ln N of every run, (n, 3).
-        outputs: names of the columns of `prediction`, of `calibration.swimmer.measured_table.OUTPUTS`.
+        outputs: names of the columns of `prediction`, of `common.run_columns.MEASURED`.
         prediction: the fitted model's outputs, (n, k); logarithms of all but θ.
 
     Returns:

@@ -45,7 +45,7 @@ from calibration.table.reader import Declaration, TableReader, open_table
 from calibration.table.runs import FEWEST_REPEATS, Runs
 from common.arrays import Flags, Floats, Integers
 from common.errors import InputError, naming
-from common.run_columns import MEASURED, OUTPUTS, RUN, RUN_COLUMNS, RUN_NOTES, RUN_SIGMAS, convert_measured
+from common.run_columns import MEASURED, RUN, RUN_COLUMNS, RUN_NOTES, RUN_SIGMAS, TO_SI, convert_measured
 from common.units import to_si
 
 _SIGMAS = dict(  # column -> nuisance parameter, factor
@@ -155,7 +155,7 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
     specimen = "robot" if "robot" in table else None
     declared = Declaration(
         _measured_outputs(table, empty),
-        {name: (column, factor) for name, (column, factor, _) in OUTPUTS.items()},
+        {name: (column, TO_SI[name]) for name, (column, _, _) in MEASURED.items()},
         needed=RUN,
         session="session",
         specimen=specimen,
@@ -206,7 +206,7 @@ def _unused_columns(empty: Sequence[str], sparse: Sequence[str], unknown: Sequen
 
 def _measured_outputs(table: pd.DataFrame, empty: Sequence[str]) -> dict[str, Output]:
     """Choose the outputs of a table, if they tell the coefficients apart; `empty`: columns without any value."""
-    outputs = {name: output for name, output in _OUTPUTS.items() if OUTPUTS[name][0] in table}
+    outputs = {name: output for name, output in _OUTPUTS.items() if MEASURED[name].column in table}
     if len(outputs) < 2 or not {"omega_yr", "R_yr", "theta", "v"} & set(outputs):
         raise InputError(
             "the table needs at least two outputs, one of them omega_yr_rad_s, R_yr_cm, theta_deg or v_cm_s: "
@@ -230,7 +230,7 @@ def _set_aside_gaps(reader: TableReader) -> list[str]:
 
 def _independent(data: Measurements) -> Measurements:
     """Choose outputs that were measured: there are repeats that differ, and not just as other outputs do."""
-    columns, repeats = [OUTPUTS[name][0] for name in data.outputs], repeat_count(data.apart)
+    columns, repeats = [MEASURED[name].column for name in data.outputs], repeat_count(data.apart)
     repeated = data.apart if repeats >= FEWEST_REPEATS else data.repeats()
     if (count := repeat_count(repeated)) < FEWEST_REPEATS:
         copies = sum(fault.reason == COPY for fault in data.excluded)

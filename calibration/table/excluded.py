@@ -119,14 +119,14 @@ def _with_first(number: Integers, copied: Flags) -> dict[int, int]:
 
 def find_copies(inputs: Floats, outputs: Floats) -> dict[int, int]:
     """Find copied rows of inputs (n, q) and outputs (n, k): place -> place of the row that it repeats."""
-    number = np.unique(np.column_stack([inputs, outputs]), axis=0, return_inverse=True)[1].reshape(-1)
-    copied = pd.Series(number).duplicated().to_numpy()
-    if not copied.any():
+    rows = pd.DataFrame(np.column_stack([inputs, outputs]))
+    if not (copied := rows.duplicated().to_numpy()).any():
         return {}
     condition = np.unique(inputs, axis=0, return_inverse=True)[1].reshape(-1)
     sizes = np.bincount(condition)
     pairs = float((sizes * (sizes - 1) / 2).sum())
     chance = math.prod(_equal(values, condition[~copied]) for values in outputs[~copied].T)
+    number = rows.groupby([*rows]).ngroup().to_numpy().astype(np.int64)
     return _with_first(number, copied) if pairs * chance < _CHANCE else {}
 
 

@@ -20,7 +20,7 @@ from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
 from common.errors import InputError
-from common.run_columns import OTHER_UNITS, OUTPUTS
+from common.run_columns import MEASURED, OTHER_UNITS
 from sim.model.presets import PRESETS
 from surrogate.table_file import load
 from tests.calibration import toy
@@ -216,7 +216,7 @@ def refused(table: pd.DataFrame, words: str) -> None:
 
 @pytest.mark.parametrize("name", OTHER_UNITS)
 def test_an_output_in_another_unit_is_refused_with_that_unit(name: str) -> None:
-    column = OUTPUTS[name][0]
+    column = MEASURED[name].column
     for factor, unit in OTHER_UNITS[name].items():
         table = toy_table(4)
         if column not in table:

@@ -25,7 +25,7 @@ from calibration.swimmer.swimmer import COEFFICIENTS, SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict import Verdict
-from common.run_columns import OUTPUTS
+from common.run_columns import MEASURED
 from tests.calibration.toy_tables import (
     DRAG,
     START,
@@ -139,7 +139,7 @@ def in_thinning_fluid(table: pd.DataFrame, rate: float) -> pd.DataFrame:
     at = start_values(model)
     thinner = model.predict([at, *({**at, "viscosity": TRUTH.viscosity * math.exp(-rate * h)} for h in hours)])
     change = np.diagonal(thinner[1:], axis1=0, axis2=1).T - thinner[0]
-    outputs = [OUTPUTS[name][0] for name in model.runs.outputs]
+    outputs = [MEASURED[name].column for name in model.runs.outputs]
     return table.assign(
         **table[outputs[:-1]] * np.exp(change[:, :-1]), theta_deg=table["theta_deg"] + np.degrees(change[:, -1])
     )
