@@ -85,12 +85,12 @@ class Result(NamedTuple):
 def answers(verdict: Verdict, case: RateCase) -> dict[str, bool]:
     """Answer every question that can be asked of a verdict."""
     sets = [{e.name for e in c.added} for c in verdict.claims]
-    beside = [{e.name for e in c.added} for c in verdict.found.rival_effects]
+    beside = [{e.name for e in c.added} for c in verdict.attribution.rival_effects]
     name, value = case.planted
     found = {
         _CLAIMED: bool(sets),
         _CLAIMED_PLAINLY: bool(sets) and not any(c.doubts for c in verdict.claims),
-        _WRONG: verdict.verdict == "number" or bool(verdict.found.rival_numbers),
+        _WRONG: verdict.verdict == "number" or bool(verdict.attribution.rival_numbers),
         _UNEXPLAINED: verdict.verdict == "unexplained",
         _MOVED: bool(verdict.moves),
         _MOVED_NAMED: any(case.planted[0] in move.effect.title for move in verdict.moves),

@@ -70,7 +70,7 @@ class Findings:
     verdict: str  # "none", "number", "effect", "ambiguous", "partial", "unexplained"; see `Attribution.verdict`
     runs: Runs  # that were calibrated with
     split: Split  # fitted and held-out runs
-    found: Attribution  # the residual, and what explains it
+    attribution: Attribution  # the residual, and what explains it
     differences: tuple[Difference, ...]  # what repeats and identities say without the model
     errors: HeldOutErrors  # on the held-out runs
     base_intervals: dict[str, tuple[float, float]]  # 95 %, by profile deviance
@@ -98,38 +98,40 @@ class Findings:
     @property
     def claims(self) -> tuple[Hypothesis, ...]:
         """What explains the residual, best first."""
-        return self.found.claims
+        return self.attribution.claims
 
     @property
     def nearest(self) -> Hypothesis | None:
         """The form that is adopted, of a partial verdict."""
-        return self.found.nearest
+        return self.attribution.nearest
 
     @property
     def forms(self) -> tuple[Hypothesis, ...]:
         """Forms that left-out runs cannot tell apart, those at the size of theory first; none if there is one."""
-        return self.found.forms
+        return self.attribution.forms
 
     @property
     def moves(self) -> tuple[Hypothesis, ...]:
         """Numbers that differ in some runs."""
-        return self.found.moves
+        return self.attribution.moves
 
     @property
     def withdrawn(self) -> tuple[Hypothesis, ...]:
         """Claims that held-out runs refuted, in order."""
-        return self.found.withdrawn
+        return self.attribution.withdrawn
 
     @property
     def not_fitted(self) -> tuple[Hypothesis, ...]:
         """Effects that may be missing, by their scores, of which there is no fit."""
-        least = self.found.misfit.critical_z if self.runs.noise_known else 0.0
-        return tuple(c for c in self.found.candidates if c.no_fit and abs(c.score) > least)
+        least = self.attribution.misfit.critical_z if self.runs.noise_known else 0.0
+        return tuple(c for c in self.attribution.candidates if c.no_fit and abs(c.score) > least)
 
     @property
     def halving(self) -> str | None:
         """Title of the form that halves the error on left-out runs, the best one; None if none does."""
-        left_out = {c.title: c.evidence.left_out for c in self.found.candidates if c.evidence.left_out is not None}
+        left_out = {
+            c.title: c.evidence.left_out for c in self.attribution.candidates if c.evidence.left_out is not None
+        }
         best = min(left_out, key=left_out.__getitem__, default=None)
         return best if best is not None and left_out[best] < _HALF else None
 
@@ -153,12 +155,12 @@ class Findings:
     @property
     def base(self) -> Fit:
         """The calibrated model, without effects."""
-        return self.found.base
+        return self.attribution.base
 
     @property
     def final(self) -> Fit:
         """The model with the effects of the verdict, with the form that is adopted, or without any."""
-        return self.found.final
+        return self.attribution.final
 
     @property
     def error_uncalibrated(self) -> float:

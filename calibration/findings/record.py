@@ -132,25 +132,25 @@ def _least_determined(final: Fit) -> dict[str, Any] | None:
 
 
 def _claims(result: Findings) -> dict[str, Any]:
-    found, claims = result.found, result.claims
+    attribution, claims = result.attribution, result.claims
     return {
         "claims": [{"title": c.title, "words": c.words, "effects": [e.name for e in c.added]} for c in claims],
         "in_form_only": list(result.in_form_only),
         "imitability": [c.evidence.imitable for c in claims],
         "transfer_p": [c.evidence.transfer for c in claims],
         "imitable": any(c.doubts for c in claims) or bool(claims and result.gain_is_certain is False),
-        "effects_instead": [[e.name for e in c.added] for c in found.rival_effects],
-        "claims_instead": [c.title for c in found.rival_effects],
-        "nearest": _adopted(result.nearest, found.forms, result.runs) if result.nearest else None,
+        "effects_instead": [[e.name for e in c.added] for c in attribution.rival_effects],
+        "claims_instead": [c.title for c in attribution.rival_effects],
+        "nearest": _adopted(result.nearest, attribution.forms, result.runs) if result.nearest else None,
         "nearest_candidate": _nearest_candidate(result),
         "not_fitted": [{"title": c.title, "reason": c.why} for c in result.not_fitted],
         "halving": result.halving,
         "certain": [e.name for e in result.certain],
         "undecided": [" and ".join(e.title for e in rest) for rest in result.undecided],
-        "candidates": [_candidate(c) for c in found.candidates],
+        "candidates": [_candidate(c) for c in attribution.candidates],
         "untestable": result.untestable,
-        "forms": [form_record(form) for form in found.forms],
-        "turns": [vars(turn) for turn in found.turns],
+        "forms": [form_record(form) for form in attribution.forms],
+        "turns": [vars(turn) for turn in attribution.turns],
     }
 
 
@@ -233,7 +233,7 @@ def _move(move: Hypothesis) -> dict[str, Any]:
 
 def _nearest_candidate(result: Findings) -> dict[str, Any] | None:
     """Find the single effect that removes most of the residual, if one was refitted and removes much."""
-    refits = [(c.fit.deviance, c.effect.title, c.why) for c in result.found.candidates if c.fit]
+    refits = [(c.fit.deviance, c.effect.title, c.why) for c in result.attribution.candidates if c.fit]
     if not refits:
         return None
     (deviance, title, reason), before = min(refits), result.base.deviance
@@ -243,14 +243,14 @@ def _nearest_candidate(result: Findings) -> dict[str, Any] | None:
 
 
 def _numbers(result: Findings) -> dict[str, Any]:
-    pulls, number = result.pulls, result.found.number
+    pulls, number = result.pulls, result.attribution.number
     learnt = [p for p in pulls if p.learnt]
     explained = result.verdict not in ("partial", "unexplained")
     notable = explained and learnt and abs(learnt[0].z) > notable_pull(len(learnt))
     return {
-        "number_check": _number_check(number) if number and result.found.number_leads else None,
-        "numbers_instead": [p.parameter.name for p in result.found.rival_numbers],
-        "rival_numbers": [_number(p) for p in result.found.rival_numbers],
+        "number_check": _number_check(number) if number and result.attribution.number_leads else None,
+        "numbers_instead": [p.parameter.name for p in result.attribution.rival_numbers],
+        "rival_numbers": [_number(p) for p in result.attribution.rival_numbers],
         "wrong_numbers": [[p.parameter.name for p in alike] for alike in result.wrong_numbers],
         "wrong_number_records": [[_number(p) for p in alike] for alike in result.wrong_numbers],
         "notable_number": learnt[0].words if notable else None,
@@ -317,7 +317,7 @@ def _errors(result: Findings) -> dict[str, Any]:
 
 
 def _tests(result: Findings) -> dict[str, Any]:
-    misfit = result.found.misfit
+    misfit = result.attribution.misfit
     return {
         "p_value": misfit.p_value,
         "p_general": misfit.general_p,
@@ -338,13 +338,13 @@ def _largest_departures(result: Findings) -> list[dict[str, Any]]:
     white = (
         runs.scale[:, None] * (runs.y - result.base.prediction) @ inverse_root(result.base.noise.run_covariance).T
     )
-    found: dict[tuple[str, ...], float] = {}
+    departures: dict[tuple[str, ...], float] = {}
     for condition in np.unique(runs.condition[used]):
         rows = used & (runs.condition == condition)
         mean = white[rows].sum(0) / math.sqrt(rows.sum())
         at = tuple(f"{name} = {v[rows][0]:.4g}{unit}" for name, (v, unit) in runs.settings.items())
-        found[at] = max(found.get(at, 0.0), float(np.sqrt((mean**2).mean())))
-    ranked = sorted(found.items(), key=lambda item: -item[1])[:_REPEATED]
+        departures[at] = max(departures.get(at, 0.0), float(np.sqrt((mean**2).mean())))
+    ranked = sorted(departures.items(), key=lambda item: -item[1])[:_REPEATED]
     return [{"at": list(at), "departure": departure} for at, departure in ranked]
 
 

@@ -62,7 +62,7 @@ def draw_all(result: Findings) -> dict[str, list[Drawn]]:
         "maps": lambda: [(figure, f"map of the residual over the runs' inputs, {model}", model)
                          for figure, model in draw_maps(result)],
     }  # fmt: skip
-    if result.found.misfit.critical_z > 0:  # else no effect can be told from the numbers
+    if result.attribution.misfit.critical_z > 0:  # else no effect can be told from the numbers
         words = "score of each effect against what a claim needs"
         figures["evidence"] = lambda: [(draw_evidence(result), words, "")]
     title = "samples of the fitted numbers and effects in pairs, by form"
@@ -184,11 +184,11 @@ def _name_kinds(axes: Axes, kinds: Sequence[str]) -> None:
 
 def draw_maps(result: Findings) -> list[tuple[Figure, str]]:
     """Draw z of every output along every feature of the inputs, a figure for each model; each with its model."""
-    maps = [("calibrated", result.found.misfit)]
+    maps = [("calibrated", result.attribution.misfit)]
     if result.claims and result.claims[0].evidence.remainder is not None:
         final = final_model(result.verdict, result.nearest, result.effects)
         maps.append((final, result.claims[0].evidence.remainder))
-    limit = max(4.0, float(np.abs(result.found.misfit.scores.shapes).max(initial=0.0)))
+    limit = max(4.0, float(np.abs(result.attribution.misfit.scores.shapes).max(initial=0.0)))
     return [(_draw_map(misfit, result.runs, limit), label) for label, misfit in maps if misfit.scores.shapes.size]
 
 
@@ -287,9 +287,9 @@ def _with_unit(number: Parameter) -> str:
 def draw_evidence(result: Findings) -> Figure:
     """Draw the score of every effect that these runs can show, with the critical score; what explains is green."""
     named = {e.name for c in result.claims for e in c.added}
-    seen = [c for c in result.found.candidates if (c.evidence.detectable or 0.0) < UNSEEN]
+    seen = [c for c in result.attribution.candidates if (c.evidence.detectable or 0.0) < UNSEEN]
     ranked = sorted(seen, key=lambda c: abs(c.score))
-    critical = result.found.misfit.critical_z
+    critical = result.attribution.misfit.critical_z
     figure = Figure(figsize=(_WIDTH, 0.7 + 0.36 * len(ranked)))
     axes = figure.add_subplot()
     limit = 1.15 * max([critical, *(abs(c.score) for c in ranked)])

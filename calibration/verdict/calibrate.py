@@ -106,21 +106,23 @@ def calibrate(
     # Explanations come first; what is left of the limit is for descriptions of what nothing explains.
     with limited(limit, _DESCRIBED, began) as budget:
         with limited(limit, _SEARCH, began):
-            study, found = explain_and_refute(study, base)
-        wanted = describe if _law_is_wanted(study, found) else None
+            study, attribution = explain_and_refute(study, base)
+        wanted = describe if _law_is_wanted(study, attribution) else None
         beside = _beside_what_no_law_is_sought(study, model) if wanted else ""
-        laws = wanted(study, found.base, beside_claim=bool(found.claims)) if wanted and not beside else None
-        if _unexplained(study, found) and not (laws and laws.complete):
-            found = adopt_in_turns(study, found)
-        of_all, moves = fit_moves(study, model, found)
+        laws = None
+        if wanted and not beside:
+            laws = wanted(study, attribution.base, beside_claim=bool(attribution.claims))
+        if _unexplained(study, attribution) and not (laws and laws.complete):
+            attribution = adopt_in_turns(study, attribution)
+        of_all, moves = fit_moves(study, model, attribution)
     # A number that differs is stated as all runs show it, the held-out ones included.
-    with_moves, moves = (of_all, moves) if of_all else (found.base, found.moves)
-    found = replace(found, moves=tuple(replace(move, fit=with_moves) for move in moves))
+    with_moves, moves = (of_all, moves) if of_all else (attribution.base, attribution.moves)
+    attribution = replace(attribution, moves=tuple(replace(move, fit=with_moves) for move in moves))
     catalogue = [e.name for e in model.effects]
     return verdict(
-        **_concluded(study, found, uncalibrated, laws, final_refit(of_all) if of_all else None),
+        **_concluded(study, attribution, uncalibrated, laws, final_refit(of_all) if of_all else None),
         **_given(given),
-        verdict=found.verdict(level),
+        verdict=attribution.verdict(level),
         runs=model.runs,
         differences=differences,
         draws=draws,
@@ -128,26 +130,30 @@ def calibrate(
             {"level": level, "seed": seed, "catalogue": catalogue, "locked": study.split.names}
         ),
         not_tried=tuple(budget.not_tried),
-        caveats=_caveats(study, model, found, budget.not_tried, beside),
+        caveats=_caveats(study, model, attribution, budget.not_tried, beside),
     )
 
 
 def _concluded(
-    study: Study, found: Attribution, uncalibrated: Floats, laws: Description | None, refit: FinalRefit | None
+    study: Study,
+    attribution: Attribution,
+    uncalibrated: Floats,
+    laws: Description | None,
+    refit: FinalRefit | None,
 ) -> dict[str, Any]:
     """Open the held-out test, and collect what follows from what was found; `refit`, if it is known already."""
-    errors = _errors(study, found, uncalibrated, laws)
-    rivals = _rivals(study, found, laws)
-    base_intervals, final_intervals = _both_intervals(study, found)
-    found = replace(found, forms=forms_in_question(study, found))
+    errors = _errors(study, attribution, uncalibrated, laws)
+    rivals = _rivals(study, attribution, laws)
+    base_intervals, final_intervals = _both_intervals(study, attribution)
+    attribution = replace(attribution, forms=forms_in_question(study, attribution))
     return {
         "split": study.split,
-        "found": found,
+        "attribution": attribution,
         "errors": errors,
         "base_intervals": base_intervals,
-        "final_intervals": _over_forms(study, found, final_intervals),
-        "pulls": pulls(found.final, study.model.nuisances),
-        "final_refit": refit or _handed_on(study, found, errors),
+        "final_intervals": _over_forms(study, attribution, final_intervals),
+        "pulls": pulls(attribution.final, study.model.nuisances),
+        "final_refit": refit or _handed_on(study, attribution, errors),
         "law": laws,
         "explanations": tuple(map(Explanation.of, rivals)),
         **_next_runs(rivals, study.seed),
@@ -164,14 +170,14 @@ def _given(model: Experiment) -> dict[str, Any]:
     }
 
 
-def _unexplained(study: Study, found: Attribution) -> bool:
-    return found.verdict(study.level) == "unexplained" or not study.model.runs.noise_known
+def _unexplained(study: Study, attribution: Attribution) -> bool:
+    return attribution.verdict(study.level) == "unexplained" or not study.model.runs.noise_known
 
 
-def _law_is_wanted(study: Study, found: Attribution) -> bool:
+def _law_is_wanted(study: Study, attribution: Attribution) -> bool:
     """Tell whether a law may describe what nothing explains, or imitate an uncertain claim."""
-    uncertain = any(claim.doubts for claim in found.claims)
-    return study.model.runs.noise_known and (_unexplained(study, found) or uncertain)
+    uncertain = any(claim.doubts for claim in attribution.claims)
+    return study.model.runs.noise_known and (_unexplained(study, attribution) or uncertain)
 
 
 def _beside_what_no_law_is_sought(study: Study, model: Experiment) -> str:
@@ -181,13 +187,13 @@ def _beside_what_no_law_is_sought(study: Study, model: Experiment) -> str:
     return "" if study.model is model else "a number that differs in some runs"
 
 
-def _rivals(study: Study, found: Attribution, laws: Description | None) -> tuple[Hypothesis, ...]:
+def _rivals(study: Study, attribution: Attribution, laws: Description | None) -> tuple[Hypothesis, ...]:
     """List what the runs cannot tell apart, laws last; none if there are not two."""
-    rivals = found.explanations
-    if laws and found.verdict(study.level) == "unexplained":
+    rivals = attribution.explanations
+    if laws and attribution.verdict(study.level) == "unexplained":
         rivals = laws.rivals
-    elif laws and any(claim.doubts for claim in found.claims):
-        rivals = (*rivals, *laws.as_good_as(found.final)[:_LAWS_TOLD_APART])
+    elif laws and any(claim.doubts for claim in attribution.claims):
+        rivals = (*rivals, *laws.as_good_as(attribution.final)[:_LAWS_TOLD_APART])
     if len(rivals) < 2:
         return ()
     # The next runs are not weighted, so they have the noise of any run.
@@ -195,28 +201,28 @@ def _rivals(study: Study, found: Attribution, laws: Description | None) -> tuple
     return tuple(replace(rival, fit=fit) for rival, fit in zip(rivals, fits, strict=True))
 
 
-def _both_intervals(study: Study, found: Attribution) -> tuple[Intervals, Intervals]:
+def _both_intervals(study: Study, attribution: Attribution) -> tuple[Intervals, Intervals]:
     """Compute the 95 % intervals of the calibrated model, and of the final one."""
     title = "intervals" if study.progress else ""
-    base = final = _intervals(found.base, study.split.fitted, title)
-    if found.final is not found.base:
-        final = _intervals(found.final, study.split.fitted, title)
-    b = birge(study.model.runs, found.final, study.split.fitted)
+    base = final = _intervals(attribution.base, study.split.fitted, title)
+    if attribution.final is not attribution.base:
+        final = _intervals(attribution.final, study.split.fitted, title)
+    b = birge(study.model.runs, attribution.final, study.split.fitted)
     for effect in (e for e in study.model.effects if e.name in final):
         low, high = final[effect.name]
         if low <= effect.start <= high:
-            end = profile_end(found.final.model, found.final, effect.name, study.split.fitted, b)
+            end = profile_end(attribution.final.model, attribution.final, effect.name, study.split.fitted, b)
             if end is not None:
                 final[effect.name] = (end, high) if end > effect.start else (low, end)
-    if found.nearest:
-        final[found.nearest.effect.name] = size_interval(found.nearest)
+    if attribution.nearest:
+        final[attribution.nearest.effect.name] = size_interval(attribution.nearest)
     return base, final
 
 
-def _over_forms(study: Study, found: Attribution, intervals: Intervals) -> Intervals:
+def _over_forms(study: Study, attribution: Attribution, intervals: Intervals) -> Intervals:
     """Widen the intervals of numbers by those that they have with other forms."""
     wider = {}
-    for name, (low, high) in envelope(study, found.base.names, found.forms).items():
+    for name, (low, high) in envelope(study, attribution.base.names, attribution.forms).items():
         if name in intervals:
             wider[name] = (min(low, intervals[name][0]), max(high, intervals[name][1]))
     return {**intervals, **wider}
@@ -248,11 +254,11 @@ def _intervals(fitted: Fit, used: Flags, title: str) -> Intervals:
     return {name: fitted.interval(name) for name in fitted.names}
 
 
-def _handed_on(study: Study, found: Attribution, errors: HeldOutErrors) -> FinalRefit:
+def _handed_on(study: Study, attribution: Attribution, errors: HeldOutErrors) -> FinalRefit:
     """Fit the final model to all runs, an adopted form only where it lowers the error on the held-out ones."""
-    adopted, final = found.nearest, found.final
+    adopted, final = attribution.nearest, attribution.final
     if adopted and not errors.fall:
-        adopted, final = None, found.base
+        adopted, final = None, attribution.base
     try:
         of_all = final.refitted_fully(study.split.kept)
     except (UnsolvedError, InputError):  # where the model breaks down on the way
@@ -269,23 +275,25 @@ def _next_runs(rivals: tuple[Hypothesis, ...], seed: int) -> dict[str, Any]:
     return {"next_runs": (), "next_batch": None}
 
 
-def _errors(study: Study, found: Attribution, uncalibrated: Floats, laws: Description | None) -> HeldOutErrors:
+def _errors(
+    study: Study, attribution: Attribution, uncalibrated: Floats, laws: Description | None
+) -> HeldOutErrors:
     """State the errors of every model on the held-out runs."""
-    base, final = found.base, found.final
+    base, final = attribution.base, attribution.final
     predictions = {"uncalibrated": uncalibrated, "before": base.prediction, "after": final.prediction}
     if laws is not None:
         predictions["law"] = laws.prediction
-    if found.nearest and found.nearest.evidence.sizes:
+    if attribution.nearest and attribution.nearest.evidence.sizes:
         with suppress(InputError):  # the simulation may break down at the mean size
-            predictions["new_specimen"] = of_new_specimen(found.nearest)
+            predictions["new_specimen"] = of_new_specimen(attribution.nearest)
     return held_out_errors(study, predictions, base, final)
 
 
 def _caveats(
-    study: Study, model: ForwardModel, found: Attribution, ended: Mapping[str, str], beside: str
+    study: Study, model: ForwardModel, attribution: Attribution, ended: Mapping[str, str], beside: str
 ) -> tuple[str, ...]:
     """Say what weakens the conclusion: what was left out or not tried, and why a fit may not be the best one."""
-    runs, split, base, final = model.runs, study.split, found.base, found.final
+    runs, split, base, final = model.runs, study.split, attribution.base, attribution.final
     when = next(iter(ended.values()), "")
     not_tried = f"provisional: the search ended {when}, and did not try {', '.join(ended)}"
     little = rows_of_little_weight(study)

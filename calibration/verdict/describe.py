@@ -20,22 +20,22 @@ from calibration.statistics.study import Study, errors
 _MOST_TURNS = 4  # of the loop
 
 
-def adopt_in_turns(study: Study, found: Attribution) -> Attribution:
+def adopt_in_turns(study: Study, attribution: Attribution) -> Attribution:
     """Adopt the nearest form, and, where something is still missing with it in the base, a further one beside it.
 
     A form that the held-out runs refute is withdrawn, and another one is looked for. Where the noise is unknown,
     no pair of effects can explain the residual, so pairs of forms compete with the single ones.
     """
-    runs, tangents, misfit = study.model.runs, found.tangents, found.misfit
-    base, candidates = found.base, found.candidates
+    runs, tangents, misfit = study.model.runs, attribution.tangents, attribution.misfit
+    base, candidates = attribution.base, attribution.candidates
     turns = [_turn(study, base, "", largest_along(misfit, runs))]
-    withdrawn = found.withdrawn
+    withdrawn = attribution.withdrawn
     while len(turns) <= _MOST_TURNS:
         form, alike, candidates = adopt_nearest(study, base, misfit, candidates, tangents)
         first = None
         if len(turns) == 1:
-            seen = {c.effect.name: c for c in (*found.candidates, *candidates)}
-            found = replace(found, candidates=tuple(seen.values()))
+            seen = {c.effect.name: c for c in (*attribution.candidates, *candidates)}
+            attribution = replace(attribution, candidates=tuple(seen.values()))
             if not runs.noise_known:
                 first, form, alike = _nearest_pair(study, base, candidates, form, alike)
         if form is None:
@@ -52,7 +52,7 @@ def adopt_in_turns(study: Study, found: Attribution) -> Attribution:
             tangents, misfit = tangents.without(index), misfit.without(index)
             candidates = tuple(c for c in candidates if c.effect != form.effect)
             continue
-        found = replace(found, nearest=form, forms=alike)
+        attribution = replace(attribution, nearest=form, forms=alike)
         if first:
             turns.append(_turn(study, first.fitted, first.title, largest_along(misfit, runs)))
         assert form.evidence.remainder is not None
@@ -63,7 +63,7 @@ def adopt_in_turns(study: Study, found: Attribution) -> Attribution:
             break
         tangents = directions(study.model, base.parameters, study.effects)
         candidates = tuple(scored(misfit, base, study.effects, misfit.critical_z))
-    return replace(found, turns=tuple(turns) if found.nearest else (), withdrawn=withdrawn)
+    return replace(attribution, turns=tuple(turns) if attribution.nearest else (), withdrawn=withdrawn)
 
 
 def _turn(study: Study, fitted: Fit, named: str, left: str) -> LoopTurn:
@@ -95,11 +95,11 @@ def _nearest_pair(
     return best
 
 
-def forms_in_question(study: Study, found: Attribution) -> tuple[Hypothesis, ...]:
+def forms_in_question(study: Study, attribution: Attribution) -> tuple[Hypothesis, ...]:
     """List the forms that left-out runs cannot tell from what is claimed or adopted; none if it stands alone."""
-    if found.claims and skipped("forms of what is claimed"):
+    if attribution.claims and skipped("forms of what is claimed"):
         return ()
-    forms: Sequence[Hypothesis] = found.forms
-    if found.claims:
-        forms = forms_of_claims(study, found.base, found.claims, found.candidates)
+    forms: Sequence[Hypothesis] = attribution.forms
+    if attribution.claims:
+        forms = forms_of_claims(study, attribution.base, attribution.claims, attribution.candidates)
     return tuple(forms) if len(forms) > 1 else ()

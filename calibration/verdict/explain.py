@@ -108,9 +108,9 @@ def explain(study: Study, base: Fit) -> Attribution:
     tested = clock()
     noise_known = study.model.runs.noise_known
     unexamined = tuple(scored(misfit, base, study.effects, misfit.critical_z))
-    found = Attribution(base, misfit, tangents, unexamined, noise_known=noise_known)
+    attribution = Attribution(base, misfit, tangents, unexamined, noise_known=noise_known)
     if misfit.p_value >= study.level or not noise_known:
-        return found
+        return attribution
     number = wrong_number_as_hypothesis(study, base, tangents)
     threshold = misfit.critical_z
     if number:  # every effect that may explain as much as the wrong number does
@@ -118,31 +118,31 @@ def explain(study: Study, base: Fit) -> Attribution:
         threshold = min(threshold, math.sqrt(max(gain - INDISTINGUISHABLE, 1.0)))
     forecast = _forecast(study, began, tested - began.seconds, _SHARE_OF_TEST * (tested - derived))
     candidates = examine(study, base, misfit, tangents, threshold=threshold, after_first=forecast)
-    found = replace(found, candidates=tuple(candidates))
+    attribution = replace(attribution, candidates=tuple(candidates))
     best = explaining(candidates)
     if number and number.kept and not (best and _fits_better(best[0], number)):
-        return replace(found, explanations=_number_or_effects(study, found, number))
+        return replace(attribution, explanations=_number_or_effects(study, attribution, number))
     # From the simplest on: one effect, one beside a wrong number, two effects.
     best = best or explaining(beside_wrong_numbers(study, base, candidates, tangents))
     second = [] if best else pairs(study, candidates)
     best = best or explaining(second)
     if best:
-        return replace(found, explanations=with_checks(study, best, base))
+        return replace(attribution, explanations=with_checks(study, best, base))
     fits = [(ebic(study, h.fit, len(h.added)), h.fit) for h in (*candidates, *second) if h.fit]
-    return replace(found, best_rejected=min(fits, key=lambda each: each[0])[1] if fits else None)
+    return replace(attribution, best_rejected=min(fits, key=lambda each: each[0])[1] if fits else None)
 
 
 def _fits_better(effect: Hypothesis, number: Hypothesis) -> bool:
     return effect.fitted.deviance < number.fitted.deviance - INDISTINGUISHABLE
 
 
-def _number_or_effects(study: Study, found: Attribution, number: Hypothesis) -> tuple[Hypothesis, ...]:
+def _number_or_effects(study: Study, attribution: Attribution, number: Hypothesis) -> tuple[Hypothesis, ...]:
     """Order a wrong number and effects that explain as much: it comes first, unless it is implausibly far off."""
-    effects = as_good_as_number(found.candidates, number.fitted, study.level)
+    effects = as_good_as_number(attribution.candidates, number.fitted, study.level)
     claims = [effect for effect in effects if effect.kept]
     if claims and any(pull.tolerances > IMPLAUSIBLE for pull in number.evidence.pulls):
-        return (*with_checks(study, claims, found.base), number)
-    return (*with_checks(study, [number], found.base), *effects)
+        return (*with_checks(study, claims, attribution.base), number)
+    return (*with_checks(study, [number], attribution.base), *effects)
 
 
 def _forecast(study: Study, began: Work, of_first_tests: float, of_a_test: float) -> Callable[[int, float], None]:

@@ -132,7 +132,7 @@ def test_a_stiffness_that_was_given_too_high_is_no_inertia(monkeypatch: pytest.M
     softer = replace(TRUTH, youngs_modulus=0.8 * TRUTH.youngs_modulus)
     model = SwimmerModel(START, read_measurements(make_table(softer, seed=5, title="")))
     result = calibrate(model, draws=FEW_DRAWS, progress=False)
-    assert "inertia" in {c.effect.name for c in result.found.candidates}
+    assert "inertia" in {c.effect.name for c in result.attribution.candidates}
     assert "inertia" not in result.effects
     assert result.verdict != "number"
     stiffness = next(p for p in result.pulls if p.parameter.name == "youngs_modulus")
@@ -214,7 +214,7 @@ def test_a_number_far_beyond_its_tolerance_is_behind_an_effect(monkeypatch: pyte
     result = calibrated(table, few=True)
     assert result.verdict == "ambiguous"
     assert result.effects == ("end_over_end_drag",)
-    (rival,) = result.found.rival_numbers
+    (rival,) = result.attribution.rival_numbers
     assert rival.parameter.name == "head_length"
     assert rival.tolerances > rules.IMPLAUSIBLE
     assert f"L (head length) that is {rival.departure} (9 of its tolerances)" in result.sentence
@@ -229,7 +229,7 @@ def test_a_number_far_beyond_its_tolerance_is_behind_an_effect(monkeypatch: pyte
         monkeypatch.setattr(module, "IMPLAUSIBLE", 2 * rival.tolerances)
     ahead = calibrated(table, few=True)
     assert ahead.verdict == "number"
-    assert [c.effect.name for c in ahead.found.rival_effects] == ["end_over_end_drag"]
+    assert [c.effect.name for c in ahead.attribution.rival_effects] == ["end_over_end_drag"]
 
 
 @pytest.mark.rest

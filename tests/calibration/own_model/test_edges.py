@@ -121,7 +121,7 @@ def cooled(changed: Callable[[Any], Any] = lambda t: 0.0, seed: int = 2, **p: fl
 
 
 def named(verdict: sf.ModelVerdict) -> list[str]:
-    return [turn.named for turn in verdict.found.turns if turn.named]
+    return [turn.named for turn in verdict.attribution.turns if turn.named]
 
 
 def test_a_flat_valley_that_ends_at_a_bound_is_a_fit() -> None:

@@ -202,7 +202,7 @@ def test_a_report_is_in_the_words_and_units_of_a_lab_with_what_to_do_next_first(
     assert seen.headings[0] == "What to do next"
     assert "Measure again: " in seen.text
     assert "scale of the camera" in seen.text
-    assert [c.effect.name for c in result.found.candidates if f"({c.effect.name})" not in seen.text] == []
+    assert [c.effect.name for c in result.attribution.candidates if f"({c.effect.name})" not in seen.text] == []
     assert seen.text.count("tail length [cm]") == 2  # of the calibrated and of the final model
     record = result.to_dict()
     given = {entry["name"]: entry["given"] for entry in record["numbers_as_given"]}

@@ -469,7 +469,7 @@ def test_a_search_that_ends_early_leaves_a_provisional_verdict(
     assert next_steps(verdict.facts)
     if not interrupts:
         assert any("end-over-end" in what for what in verdict.not_tried)
-        assert all(c.fit is None for c in verdict.found.candidates)
+        assert all(c.fit is None for c in verdict.attribution.candidates)
         assert not effect().not_tried
 
 

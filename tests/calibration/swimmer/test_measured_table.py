@@ -116,7 +116,7 @@ def test_copied_rows_are_no_repeats() -> None:
     assert str(runs.excluded[0]) == "row 97: a copy of an earlier row, equal in all inputs and outputs (row 1)"
     assert len(runs.excluded) == 40
     result, without = calibrated(copied, few=True), none()
-    assert result.found.misfit.p_value == without.found.misfit.p_value
+    assert result.attribution.misfit.p_value == without.attribution.misfit.p_value
     assert result.summary_of_excluded[0].startswith("40 of 136 rows (rows 97, 98, 99 and 37 more): a copy")
     assert result.rows == 136
     single = table[table["trial"] == 1].assign(session=range(48))

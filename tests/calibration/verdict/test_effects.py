@@ -181,7 +181,7 @@ def test_a_tracked_point_off_the_centre_changes_radius_and_angle_alone() -> None
 def test_an_effect_that_changes_nothing_says_so(tmp_path: Path) -> None:
     """The toy's tails cannot touch: no size of contact shows, and the report has no size for it."""
     result = ambiguous()
-    contact = next(c for c in result.found.candidates if c.effect.name == "tail_contact")
+    contact = next(c for c in result.attribution.candidates if c.effect.name == "tail_contact")
     assert contact.reason is Reason.NO_CHANGE
     write_report(result, result.to_dict(), tmp_path / "report.html")
     text = (tmp_path / "report.html").read_text()
@@ -197,7 +197,7 @@ def test_the_held_out_session_has_no_say_judges_and_is_used_in_the_end() -> None
     table.loc[table["session"] == result.split.names, "omega_yr_rad_s"] *= 1.5
     ruined = calibrated(table, few=True)
     assert ruined.final.parameters == result.final.parameters
-    assert ruined.found.misfit.p_value == result.found.misfit.p_value
+    assert ruined.attribution.misfit.p_value == result.attribution.misfit.p_value
     assert ruined.error_after > 1.5 * result.error_after
     assert ruined.errors.p_value < 0.01
     assert ruined.final_refit.parameters["C_yr"] != pytest.approx(ruined.final.parameters["C_yr"], rel=0.02)

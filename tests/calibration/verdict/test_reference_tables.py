@@ -112,7 +112,7 @@ def test_where_tolerances_are_wide_a_wrong_number_comes_ahead_of_those_rivals() 
     result = calibrated("ambiguous")
     assert result.verdict == "number"
     assert result.effects == ()
-    assert "tail_spin_drag" in {e.name for c in result.found.rival_effects for e in c.added}
+    assert "tail_spin_drag" in {e.name for c in result.attribution.rival_effects for e in c.added}
     assert "If the number is right, " in result.sentence
     assert re.fullmatch("the stated value of .* is wrong", result.explanations[0].title)
 

@@ -33,7 +33,7 @@ from tests.calibration.toy_tables import DRAG, FEW_CANDIDATES, ambiguous, calibr
     ],
 )
 def test_the_rule(p_value: float, effects: int, rival_numbers: int, number_explains: bool, verdict: str) -> None:
-    found = none().found
+    found = none().attribution
     effect = Hypothesis(Origin.EFFECT, (), found.base)
     number = Hypothesis(Origin.NUMBER, (), found.base, Evidence(pulls=none().pulls[:1]))
     explanations = (effect,) * effects + (number,) * rival_numbers if effects else (number,) * number_explains
@@ -99,9 +99,9 @@ def test_a_number_that_is_hardly_an_error_of_measurement_is_hedged(tolerances: f
     said = number()
     (pull,) = (p for p in said.pulls if p.freed)
     pull = replace(pull, alone=tolerances * pull.parameter.sigma)
-    claim = said.found.number.seen(imitable=0.0, transfer=0.5, pulls=(pull,))
+    claim = said.attribution.number.seen(imitable=0.0, transfer=0.5, pulls=(pull,))
     claim = doubted(claim, Trial(Study(said.base.model, said.split), said.base), RULES)
-    sentence = replace(said, found=replace(said.found, explanations=(claim,))).sentence
+    sentence = replace(said, attribution=replace(said.attribution, explanations=(claim,))).sentence
     assert ("or something outside the catalogue looks like it" in sentence) == hedged
     assert ("off by 8 of its tolerances" in sentence) == hedged
 

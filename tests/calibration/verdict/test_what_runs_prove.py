@@ -193,9 +193,9 @@ def test_the_loop_turns_until_only_noise_is_left() -> None:
     """Two effects are missing, and the rest is no noise, so that none and no pair explains the runs."""
     result = verdict(falls(11, rounds=6, repeats=6, wall=1.5, late=1.0, bump=0.03))
     assert result.verdict == "partial"
-    assert len({turn.named for turn in result.found.turns}) == 3
-    assert result.found.turns[0].named == ""
-    errors = [turn.error for turn in result.found.turns]
+    assert len({turn.named for turn in result.attribution.turns}) == 3
+    assert result.attribution.turns[0].named == ""
+    errors = [turn.error for turn in result.attribution.turns]
     assert errors == sorted(errors, reverse=True)
     assert result.errors.rms["after"] == pytest.approx(errors[-1])
     assert [turn["error"] for turn in result.facts["turns"]] == errors
@@ -217,7 +217,7 @@ def test_a_pull_without_a_residual_is_no_wrong_number() -> None:
     for off in (0.0, 0.1):
         table = falls(13).assign(v=lambda t, off=off: t["v"] * (1 + off) ** t["d"])
         result = calibrate(read_runs_of(table, given, Roles(session="round"))[0], draws=200, progress=False)
-        seen.append((result.verdict, result.found.misfit.p["pull"] < 0.02))
+        seen.append((result.verdict, result.attribution.misfit.p["pull"] < 0.02))
     assert seen[0] == ("none", False)
     assert seen[1][1]
     assert seen[1][0] != "none"
