@@ -107,11 +107,11 @@ def _fitted(
     plain: Experiment, known: tuple[Shift, ...], shift: Shift, z: float, base: Fit, used: Flags
 ) -> list[Hypothesis]:
     """Fit a number that differs in some runs, beside those that are known to, from all values of its grid."""
-    change, moves = shift.parameter, []
+    change, moves = shift.change, []
     if change.name in base.names:  # with a grid it has the score of another number
         return []
     model, names = Shifted(plain, (*known, shift)), (*base.names, change.name)
-    for start in shift.of.grid or (0.0,):
+    for start in shift.parameter.grid or (0.0,):
         if skipped(change.title):
             continue
         try:
@@ -125,7 +125,7 @@ def _fitted(
 
 def _tolerances(move: Hypothesis) -> float:
     """Return how many of its tolerances a number is off; none for a coefficient, and for a zero of any size."""
-    number = shift_of(move).of
+    number = shift_of(move).parameter
     return abs(move.size) / (math.inf if number.plausible else number.sigma or math.inf)
 
 

@@ -102,7 +102,7 @@ def varying(model: ForwardModel, effect: Parameter, spread: float) -> Shifted:
 
 def sizes_of(model: Shifted, parameters: Parameters) -> Floats:
     """Compute ε_g of every specimen."""
-    sizes = model.of_runs(parameters)[model.shifts[0].of.name]
+    sizes = model.of_runs(parameters)[model.shifts[0].parameter.name]
     return np.array([sizes[s.rows][0] for s in model.shifts])
 
 
@@ -235,7 +235,7 @@ def _with_spread(study: Study, constant: Fit, effect: Parameter) -> tuple[Fit, f
     logarithmic = effect.start in effect.bounds
     spread = 1.0 if logarithmic else max(abs(constant.parameters[effect.name]) / 2, abs(effect.typical) / 10)
     least = 1e-3 * (1.0 if logarithmic else abs(effect.typical))
-    departures = [s.parameter.name for s in varying(study.model, effect, spread).shifts]
+    departures = [s.change.name for s in varying(study.model, effect, spread).shifts]
     start = {**constant.parameters, **dict.fromkeys(departures, 0.0)}
     if logarithmic:
         start[effect.name] = math.copysign(
@@ -367,8 +367,8 @@ def _interval_of_size(study: Study, form: Hypothesis) -> tuple[float, float]:
 def _differs_from_null(study: Study, fitted: Fit, seen: Integers) -> bool:
     """Tell by a t-test whether the mean of the sizes that specimens ask for on their own is not the null."""
     runs, used, model = study.model.runs, study.split.fitted, cast(Shifted, fitted.model)
-    effect = model.shifts[0].of
-    own = {effect.name, *(s.parameter.name for s in model.shifts)}
+    effect = model.shifts[0].parameter
+    own = {effect.name, *(s.change.name for s in model.shifts)}
     kept = [i for i, name in enumerate(fitted.names) if name not in own]
     sizes = sizes_of(model, fitted.parameters)[seen]
     along = derivatives(model.inner, model.of_runs(fitted.parameters), [effect.name])[1]
@@ -387,11 +387,11 @@ def _differs_from_null(study: Study, fitted: Fit, seen: Integers) -> bool:
 def _sizes(form: Hypothesis, seen: Integers) -> dict[str, tuple[float, float, float]]:
     """Compute the size of each fitted specimen, and its interval."""
     fitted, model = form.fitted, cast(Shifted, form.model)
-    effect, names, sizes = model.shifts[0].of, specimens(model.runs)[1], sizes_of(model, fitted.parameters)
+    effect, names, sizes = model.shifts[0].parameter, specimens(model.runs)[1], sizes_of(model, fitted.parameters)
     mean = fitted.names.index(effect.name)
     stated = {}
     for g in seen.tolist():
-        index = fitted.names.index(model.shifts[g].parameter.name)
+        index = fitted.names.index(model.shifts[g].change.name)
         pair = fitted.covariance[np.ix_([mean, index], [mean, index])].sum()
         half = min(float(ndtri(0.975)) * math.sqrt(form.evidence.birge * pair), _LARGEST)
         stated[names[g]] = (float(sizes[g]), *_ends(effect, float(sizes[g]), half))
@@ -405,7 +405,7 @@ def of_new_specimen(form: Hypothesis) -> Floats:
 
 def _departures(form: Hypothesis) -> tuple[str, ...]:
     """Return the names of u_g."""
-    return tuple(s.parameter.name for s in cast(Shifted, form.model).shifts) if form.evidence.sizes else ()
+    return tuple(s.change.name for s in cast(Shifted, form.model).shifts) if form.evidence.sizes else ()
 
 
 def for_new_specimen(form: Hypothesis, refit: FinalRefit) -> FinalRefit:

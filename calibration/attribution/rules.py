@@ -171,7 +171,7 @@ def _form_includes_null(h: Hypothesis, _: Trial) -> bool:
 
 def _number_not_credible(h: Hypothesis, _: Trial) -> bool:
     """Tell whether a number differs by more than is credible; half a turn may be a little more by its error."""
-    number = shift_of(h).of
+    number = shift_of(h).parameter
     if number.sigma is None:
         return False
     if number.plausible:
@@ -195,7 +195,7 @@ def refuting(hypothesis: Hypothesis) -> list[SetErrors]:
 
 def shift_of(move: Hypothesis) -> Shift:
     """Return the shift of a number that differs in some runs."""
-    return next(s for s in cast(Shifted, move.model).shifts if s.parameter.name == move.effect.name)
+    return next(s for s in cast(Shifted, move.model).shifts if s.change.name == move.effect.name)
 
 
 _EFFECTS = (Origin.EFFECT, Origin.PAIR)

@@ -148,6 +148,11 @@ class Findings:
         return tuple(tuple(e for e in c.added if e not in certain) for c in self.claims) if certain else ()
 
     @property
+    def paths(self) -> tuple[Any, ...]:
+        """Errors on paths, of a robot for which they were asked."""
+        return ()
+
+    @property
     def handed_on(self) -> tuple[Parameter, ...]:
         """What was fitted to all runs and any other run has, too."""
         return tuple(p for p in self.final_refit.fitted if p.name in (*self.numbers, *self.catalogue))

@@ -220,15 +220,19 @@ def _withdrawn(claim: Hypothesis) -> dict[str, Any]:
 def _move(move: Hypothesis) -> dict[str, Any]:
     shift, name = shift_of(move), move.effect.name
     record = {
-        "number": shift.of.name,
+        "number": shift.parameter.name,
         "where": shift.where,
         "change": move.size,
         "interval": list(move.fitted.interval(name)),
-        "scale": "logarithm" if shift.of.logarithmic else "as it is",
+        "scale": "logarithm" if shift.parameter.logarithmic else "as it is",
         "score": move.score,
         "instead": list(move.evidence.instead),
     }
-    return {"words": move_in_words(record, move.effect.title, shift.of.shown, shift.of.unit), **record}
+    number = shift.parameter
+    return {
+        "words": move_in_words(record, move.effect.title, number.shown, number.unit),
+        **record,
+    }
 
 
 def _nearest_candidate(result: Findings) -> dict[str, Any] | None:

@@ -29,8 +29,8 @@ def check_function(model: FunctionModel, *, title: str = "") -> tuple[str, ...]:
             nothing, or an output is far from what was measured.
     """
     runs = model.runs
-    if runs.sigma is None and repeat_count(runs.apart) >= FEWEST_REPEATS:
-        refuse_equal_repeats(runs, runs.apart, runs.outputs)
+    if runs.sigma is None and repeat_count(runs.repeat_ids) >= FEWEST_REPEATS:
+        refuse_equal_repeats(runs, runs.repeat_ids, runs.outputs)
     parameters, start = model.model.parameters, start_values(model)
     count = len(model.coefficients)
     if len(runs) < _FEWEST or runs.values(np.ones(len(runs), dtype=bool)) <= count:

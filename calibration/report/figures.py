@@ -53,7 +53,7 @@ Drawn = tuple[Figure, str, str]  # with a description and a caption
 def draw_all(result: Findings) -> dict[str, list[Drawn]]:
     """Draw the figures of a report, by their names in the template; one that fails is left out with a warning."""
     kind, adopted, law = result.runs.drawn[1][0], result.nearest, result.law
-    carried_out = [error for error in getattr(result, "paths", ()) if error.carried_out]  # of a robot
+    carried_out = [error for error in result.paths if error.carried_out]
     figures: dict[str, Callable[[], list[Drawn]]] = {
         "summary": lambda: [(draw_summary(result), "residual of each output over the noise, for each model",
                              "The same on the runs that were fitted, for each output.")],

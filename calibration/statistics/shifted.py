@@ -29,17 +29,17 @@ _LARGEST = 7.0  # change of a logarithm without a prior
 class Shift:
     """A parameter that differs in some runs."""
 
-    of: Parameter  # with the scale on which it differs
+    parameter: Parameter  # with the scale on which it differs
     rows: Flags  # (n,)
     where: str  # in words, as in "in session day3" or "of ball 2"
     sigma: float | None = None  # of its prior; None: free
 
     @property
-    def parameter(self) -> Parameter:
+    def change(self) -> Parameter:
         """The shift as a parameter, on its scale."""
-        typical = 0.1 if self.of.logarithmic else self.of.sigma or self.of.typical
-        end = math.inf if self.sigma else _LARGEST if self.of.logarithmic else 100 * typical
-        name, title = f"{self.of.name} {self.where}", f"{self.of.title} {self.where}"
+        typical = 0.1 if self.parameter.logarithmic else self.parameter.sigma or self.parameter.typical
+        end = math.inf if self.sigma else _LARGEST if self.parameter.logarithmic else 100 * typical
+        name, title = f"{self.parameter.name} {self.where}", f"{self.parameter.title} {self.where}"
         return Parameter(name, title, 0.0, (-end, end), typical, sigma=self.sigma)
 
 
@@ -51,15 +51,15 @@ class Shifted(Wrapped):
 
     @cached_property
     def coefficients(self) -> tuple[Parameter, ...]:
-        return (*self.inner.coefficients, *(s.parameter for s in self.shifts if s.sigma is None))
+        return (*self.inner.coefficients, *(s.change for s in self.shifts if s.sigma is None))
 
     @property
     def nuisances(self) -> tuple[Parameter, ...]:
-        return (*self.inner.nuisances, *(s.parameter for s in self.shifts if s.sigma is not None))
+        return (*self.inner.nuisances, *(s.change for s in self.shifts if s.sigma is not None))
 
     @property
     def effects(self) -> tuple[Parameter, ...]:
-        shifted = {s.of.name: s.of for s in self.shifts}
+        shifted = {s.parameter.name: s.parameter for s in self.shifts}
         return tuple(shifted.get(effect.name, effect) for effect in self.inner.effects)
 
     def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
@@ -71,7 +71,7 @@ class Shifted(Wrapped):
         self, at: Parameters, along: Sequence[Parameter], *, title: str = "", quick: bool = False
     ) -> Predict:
         """Return the linear model, see `ForwardModel`."""
-        own, centre = {s.parameter.name: s.of.name for s in self.shifts}, self.of_runs(at)
+        own, centre = {s.change.name: s.parameter.name for s in self.shifts}, self.of_runs(at)
         inner = [parameter(self.inner, name) for name in dict.fromkeys(own.get(p.name, p.name) for p in along)]
         beyond = {of.name: self._unbounded(at)[of.name] - centre[of.name] for of in self._differing}
         with self._arrays_taken():
@@ -105,12 +105,14 @@ class Shifted(Wrapped):
     @property
     def _differing(self) -> list[Parameter]:
         """What shifts."""
-        return list({s.of.name: s.of for s in self.shifts}.values())
+        return list({s.parameter.name: s.parameter for s in self.shifts}.values())
 
     def _unbounded(self, parameters: Parameters) -> dict[str, Any]:
         inner = {**parameters}
         for s in self.shifts:
-            inner[s.of.name] = s.of.changed(inner[s.of.name], inner.pop(s.parameter.name) * s.rows)
+            inner[s.parameter.name] = s.parameter.changed(
+                inner[s.parameter.name], inner.pop(s.change.name) * s.rows
+            )
         return inner
 
     def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:

@@ -230,8 +230,8 @@ def _set_aside_gaps(reader: TableReader) -> list[str]:
 
 def _independent(data: Measurements) -> Measurements:
     """Choose outputs that were measured: there are repeats that differ, and not just as other outputs do."""
-    columns, repeats = [MEASURED[name].column for name in data.outputs], repeat_count(data.apart)
-    repeated = data.apart if repeats >= FEWEST_REPEATS else data.repeats()
+    columns, repeats = [MEASURED[name].column for name in data.outputs], repeat_count(data.repeat_ids)
+    repeated = data.repeat_ids if repeats >= FEWEST_REPEATS else data.repeats()
     if (count := repeat_count(repeated)) < FEWEST_REPEATS:
         copies = sum(fault.reason == COPY for fault in data.excluded)
         without = f", without {copies} copies of rows" if copies else ""

@@ -85,8 +85,8 @@ class Runs:
 
     def repeated(self, rows: Flags | slice) -> bool:
         """Tell whether there are repeats, or mirror runs in their place, from which the noise can be estimated."""
-        if repeat_count(self.apart[rows]) >= FEWEST_REPEATS or not self.mirrored[1][rows].any():
-            return repeat_count(self.apart[rows]) >= FEWEST_REPEATS
+        if repeat_count(self.repeat_ids[rows]) >= FEWEST_REPEATS or not self.mirrored[1][rows].any():
+            return repeat_count(self.repeat_ids[rows]) >= FEWEST_REPEATS
         return repeat_count(np.column_stack([self._mirror_design(rows), self._alone(rows)])) >= FEWEST_REPEATS
 
     def _alone(self, rows: Flags | slice) -> Floats:
@@ -101,7 +101,7 @@ class Runs:
         return np.asarray(np.diagonal(self.completion, axis1=1, axis2=2) == 0)
 
     @property
-    def apart(self) -> Integers:
+    def repeat_ids(self) -> Integers:
         """The condition (n,); a run with a gap has one of its own."""
         own = self.condition.max() + 1 + np.arange(len(self))
         return np.where(self.gaps.any(1), own, self.condition)
@@ -140,7 +140,7 @@ class Runs:
         what is smooth in the inputs is not counted with it.
         """
         session, noted = self.session[rows], self.noted_of_repeats[rows]
-        condition = self.apart[rows]
+        condition = self.repeat_ids[rows]
         alone = self._alone(rows)
         differing = np.empty((len(condition), 0)) if self.differing is None else self.differing[rows]
         if (count := repeat_count(condition)) < FEWEST_REPEATS:

@@ -57,7 +57,7 @@ def test_speeds_are_those_of_the_equation_of_motion(effect: str, size: float) ->
 def test_a_varying_size_has_the_derivatives_of_differences(effect: str) -> None:
     model = balls(falls("nothing", 0))
     differing = varying(model, next(e for e in model.effects if e.name == effect), 0.5)
-    departures = {s.parameter.name: 0.1 * (i - 4) for i, s in enumerate(differing.shifts)}
+    departures = {s.change.name: 0.1 * (i - 4) for i, s in enumerate(differing.shifts)}
     at = {**start_values(model), effect: 0.3, **departures}
     names = ("gravity", effect, *departures)
     close = by_differences(differing, at, names)[1]
@@ -71,7 +71,7 @@ def test_a_size_at_its_bound_has_a_derivative() -> None:
     drag = next(e for e in model.effects if e.name == "quadratic_drag")
     differing = Shifted(model, (Shift(drag, np.arange(len(model.runs)) < 80, "here"),))
     at = {**start_values(differing), drag.name: drag.bounds[0]}
-    _, J = derivatives(differing, at, [drag.name, differing.shifts[0].parameter.name])
+    _, J = derivatives(differing, at, [drag.name, differing.shifts[0].change.name])
     assert J[:80, :, 1] == pytest.approx(J[:80, :, 0], rel=1e-6)
     assert J[:80, :, 0] == pytest.approx(by_differences(model, at, [drag.name])[1][:80, :, 0], rel=1e-6)
 

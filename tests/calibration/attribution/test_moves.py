@@ -103,7 +103,7 @@ def test_derivatives_along_a_change_are_those_of_differences() -> None:
         rows = model.runs.session == 1
         numbers = (model.coefficients[1], model.nuisances[0])
         moved = Shifted(model, tuple(Shift(number, rows, "in session day 2") for number in numbers))
-        names = ["C_r", *(shift.parameter.name for shift in moved.shifts)]
+        names = ["C_r", *(shift.change.name for shift in moved.shifts)]
         at = {**start_values(moved), **{name: 0.1 for name in names[1:]}}
         close = by_differences(moved, at, names)[1]
         assert derivatives(moved, at, names)[1] == pytest.approx(close, abs=0.02 * np.abs(close).max())
