@@ -1,12 +1,13 @@
-"""Processor time from the shell to the answer of `plan`, `steady` and `query`, and its parts.
+"""Processor time from the shell to the answer of `plan`, `steady`, `query` and `calibrate`, and its parts.
 
 Usage: python -m benchmarks startup [RUNS]
 
 The first column is the whole command. The others are parts of a process that does the same from Python: start of
 the interpreter and imports; reading the look-up table and compiled loops, that is the first answer less a second
-one; a second answer. The least of RUNS runs each (default: 5).
+one; a second answer. `calibrate` is that of a model of one's own, of which only the command writes a report. The
+least of RUNS runs each (default: 5).
 
-Takes 30 seconds.
+Takes 45 seconds.
 """
 
 from __future__ import annotations
@@ -53,6 +54,15 @@ read = cache(load_table)
 """,
     "answer_with_error(read(), group_columns([load_robot('paper-control')]))",
 )
+_MODEL, _RUNS = "docs/models/tower.py", "docs/models/data/tower.csv"
+_CALIBRATE = (
+    f"""
+from calibration.own_model.model_file import load_model
+from softflagella.closed_loop import calibrate
+model, table = load_model({_MODEL!r}, {_RUNS!r})
+""",
+    "calibrate(table, model, session='ball_kg_m3', progress=False)",
+)
 
 
 def main(*words: str) -> None:
@@ -63,6 +73,10 @@ def main(*words: str) -> None:
             "plan circle:1.5l": (["plan", "circle:1.5l", "--robot", "paper-control", "--out", folder], _PLAN),
             "steady": (["steady", "paper-control"], _STEADY),
             "query": (["query", "paper-control"], _QUERY),
+            "calibrate": (
+                ["calibrate", _RUNS, "--model", _MODEL, "--session", "ball_kg_m3", "--out", f"{folder}/out"],
+                _CALIBRATE,
+            ),
         }
         for name, (command, (imports, answer)) in commands.items():
             whole = min(interpreter_time("-m", "softflagella", *command)[0] for _ in range(runs))
