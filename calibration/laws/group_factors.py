@@ -113,7 +113,7 @@ def _along(model: LawModel, fitted: Fit, used: Flags, place: int, x: Floats) -> 
     linear = Regression(columns, precisions(parameters), data.session[used], data.scale[used], data.repeats(used))
     as_given = (data.y - fitted.prediction)[used] + J @ prior_offsets(parameters, fitted.parameters)
     products = linear.products(as_given, fitted.noise.run_covariance)
-    left = schur_complement(products.at(products.share(passes=_PASSES)), len(others))
+    left = schur_complement(products.at(products.session_ratio(passes=_PASSES)), len(others))
     information, score = left[:-1, :-1], left[:-1, -1]
     if not is_term:  # a factor that all groups have in common is free
         common = information.sum(1)

@@ -60,7 +60,7 @@ class LinearFits:
 
     gain: Floats  # (B, M) BIC of the model without a place less that with it
     weights: Floats  # (B, M, v) of the place's columns; 0 where the column is not in the model
-    base_share: Floats  # (B, k) ρ without a place
+    base_session_ratio: Floats  # (B, k) ρ without a place
 
 
 class LinearModels:
@@ -105,12 +105,14 @@ class LinearModels:
         p, own, absorbed = self.p, np.arange(self._count), list(range(self.p))
         products = self.design.products(residual)
         base = products.take(np.array([[*absorbed, -1]]))
-        base_share = base.share(passes=_PASSES)
-        without = schur_complement(base.at(base_share), p)[..., 0, 0] + base.determinant(base_share)  # (B, 1)
+        base_session_ratio = base.session_ratio(passes=_PASSES)
+        without = schur_complement(base.at(base_session_ratio), p)[..., 0, 0] + base.determinant(
+            base_session_ratio
+        )  # (B, 1)
         firsts = range(p, p + self._places * self._count, self._count)
         places = products.take(np.array([[*absorbed, *(first + own), -1] for first in firsts]))
-        share = places.share(passes=_PASSES)
-        normal, determinant = places.at(share), places.determinant(share)
+        session_ratio = places.session_ratio(passes=_PASSES)
+        normal, determinant = places.at(session_ratio), places.determinant(session_ratio)
         left = schur_complement(normal, p)  # (B, P, v + 1, v + 1)
         left[..., own, own] += _ABSORBED * normal[..., p + own, p + own]
         shape = len(residual), len(self.models)
@@ -125,7 +127,7 @@ class LinearModels:
             price = (q + self._further[which]) * math.log(residual[0].size)
             gain[:, which] = without - deviance - price
             weights[:, which[:, None], chosen] = step
-        return LinearFits(gain, weights, base_share[:, 0])
+        return LinearFits(gain, weights, base_session_ratio[:, 0])
 
 
 @dataclass(frozen=True)
@@ -254,7 +256,10 @@ def _subsets(items: Sequence[int] | range, *, at_least: int) -> list[tuple[int, 
 def search_p_value(search: Search, *, seed: int) -> float:
     """Estimate the probability that noise alone gains as much in a search; `seed` of the draws."""
     models, fits = search.models, search.fits
-    run, share = models.design.noise(search.residual), np.tile(fits.base_share, (DRAWS, 1))
-    null = models.fit(models.design.draw(np.random.default_rng(seed), run, share))
+    run_covariance, session_ratio = (
+        models.design.noise(search.residual),
+        np.tile(fits.base_session_ratio, (DRAWS, 1)),
+    )
+    null = models.fit(models.design.draw(np.random.default_rng(seed), run_covariance, session_ratio))
     as_large = int(np.count_nonzero(null.gain.max(1) >= fits.gain.max()))
     return (1 + as_large) / (1 + DRAWS)

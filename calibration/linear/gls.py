@@ -49,7 +49,7 @@ import numpy as np
 
 from common.arrays import Flags, Floats, Integers
 
-UNKNOWN_SHARE = 1.0  # ρ where nothing is known about it
+UNKNOWN_RATIO = 1.0  # ρ where nothing is known about it
 _MOST_SCATTER = 9.0  # largest ρ
 _LEAST_FREEDOM = 0.5  # degrees of freedom of the sessions' means below which ρ is unknown
 _RIDGE = 1e-11  # so that columns without any signal get a large variance
@@ -130,9 +130,9 @@ class Regression:
         """Average each session, times the root of its size, (s, ...), of (n, ...)."""
         return np.asarray(np.tensordot(self.picks, table, 1))
 
-    def shrink(self, table: Floats, share: Floats) -> Floats:
+    def shrink(self, table: Floats, session_ratio: Floats) -> Floats:
         """Whiten runs (B, n, k) in Σ that are white in S, with ρ (B, k)."""
-        less = 1 / np.sqrt(1 + share[:, None, :] * self.sizes[:, None]) - 1  # (B, s, k)
+        less = 1 / np.sqrt(1 + session_ratio[:, None, :] * self.sizes[:, None]) - 1  # (B, s, k)
         return np.asarray(table + self.picks.T @ (less * (self.picks @ table)))
 
     def noise(self, residual: Floats) -> Floats:
@@ -143,16 +143,16 @@ class Regression:
         return repeat_covariance(residual, self.repeated, self.scale)
 
     def products(
-        self, residual: Floats, run: Floats | None = None, change: Floats | None = None
+        self, residual: Floats, run_covariance: Floats | None = None, change: Floats | None = None
     ) -> NormalEquations:
         """Multiply the columns, and a residual behind them, with each other, with the priors.
 
         Args:
             residual: (..., n, k).
-            run: S, (k, k) or (..., k, k); default: that of each residual.
+            run_covariance: S, (k, k) or (..., k, k); default: that of each residual.
             change: of the parameters with which the residual was computed from those as given (p,); default 0.
         """
-        root = inverse_root(self.noise(residual) if run is None else run)
+        root = inverse_root(self.noise(residual) if run_covariance is None else run_covariance)
         precision = np.swapaxes(root, -1, -2) @ root
         (*batch, n, k), m = residual.shape, self.means.shape[-1]
         residual = residual * self.scale[:, None]
@@ -173,24 +173,26 @@ class Regression:
         means = means.reshape(*batch, -1, m + 1)
         return NormalEquations(total - np.swapaxes(means, -1, -2) @ means, means, self.sizes, k)
 
-    def draw(self, rng: np.random.Generator, run: Floats, share: Floats, spread: Floats | None = None) -> Floats:
+    def draw(
+        self, rng: np.random.Generator, run_covariance: Floats, session_ratio: Floats, spread: Floats | None = None
+    ) -> Floats:
         """Draw residuals (B, n, k) from the parameters as given: noise of runs and sessions, and the parameters.
 
         Args:
-            run: S (k, k).
-            share: (B, k) ρ of each table.
+            run_covariance: S (k, k).
+            session_ratio: (B, k) ρ of each table.
             spread: (p, p) root of the covariance of the first p parameters; default: that of the priors.
         """
-        count, (n, k, _), p = len(share), self.columns.shape, len(self.precision)
+        count, (n, k, _), p = len(session_ratio), self.columns.shape, len(self.precision)
         noise = rng.normal(size=(count, n, k)) / self.scale[:, None]
         shifts = rng.normal(size=(count, len(self.sizes), k))[:, self.session]
-        noise += np.sqrt(share)[:, None, :] * shifts
+        noise += np.sqrt(session_ratio)[:, None, :] * shifts
         if spread is None:
             known = self.precision > 0
             spread = np.diag(np.where(known, 1 / np.sqrt(np.where(known, self.precision, 1.0)), 0.0))
         change = rng.normal(size=(count, p)) @ spread.T
         J = self.columns[..., :p] / self.scale[:, None, None]
-        axes = np.linalg.inv(inverse_root(run))
+        axes = np.linalg.inv(inverse_root(run_covariance))
         noise = noise @ axes.T
         if self.completion is not None:
             noise = np.einsum("nab,Bnb->Bna", self.completion, noise)
@@ -203,7 +205,7 @@ class LeastSquares:
 
     step: Floats  # (..., p)
     covariance: Floats  # (..., p, p) with the scatter of sessions in full
-    share: Floats  # (..., k) ρ
+    session_ratio: Floats  # (..., k) ρ
 
 
 @dataclass(frozen=True)
@@ -215,22 +217,22 @@ class NormalEquations:
     sizes: Floats  # (s,) runs of a session, or their weights
     outputs: int
 
-    def at(self, share: Floats | float) -> Floats:
+    def at(self, session_ratio: Floats | float) -> Floats:
         """Compute columnᵀ Σ⁻¹ column, (..., m, m), for ρ (..., k)."""
-        weighted = self._weights(np.asarray(share))[..., None] * self.means
+        weighted = self._weights(np.asarray(session_ratio))[..., None] * self.means
         return np.asarray(self.within + np.swapaxes(self.means, -1, -2) @ weighted)
 
-    def _weights(self, share: Floats) -> Floats:
+    def _weights(self, session_ratio: Floats) -> Floats:
         """Compute 1/(1 + ρ n) of the means, (..., s k)."""
-        share = np.broadcast_to(share, (*share.shape[:-1], self.outputs))
-        weights = 1 / (1 + share[..., None, :] * self.sizes[:, None])
-        return np.asarray(weights.reshape(*share.shape[:-1], len(self.sizes) * self.outputs))
+        session_ratio = np.broadcast_to(session_ratio, (*session_ratio.shape[:-1], self.outputs))
+        weights = 1 / (1 + session_ratio[..., None, :] * self.sizes[:, None])
+        return np.asarray(weights.reshape(*session_ratio.shape[:-1], len(self.sizes) * self.outputs))
 
-    def for_fit(self, share: Floats | float) -> tuple[Floats, Floats]:
+    def for_fit(self, session_ratio: Floats | float) -> tuple[Floats, Floats]:
         """Compute columnᵀ W column, and columnᵀ W Σ W column, (..., m, m), for ρ (..., k)."""
-        share = np.asarray(share)
-        weights = self._weights(share)[..., None]
-        of_fit = self._weights(np.where(self.estimated, share, 0.0))[..., None]
+        session_ratio = np.asarray(session_ratio)
+        weights = self._weights(session_ratio)[..., None]
+        of_fit = self._weights(np.where(self.estimated, session_ratio, 0.0))[..., None]
         rest = self._about_common(self.means)
         seen = self.means - rest + self._about_common(of_fit * rest)
         transposed = np.swapaxes(seen, -1, -2)
@@ -260,9 +262,9 @@ class NormalEquations:
         common = np.einsum("s,...skm->...km", along, each)
         return np.asarray((each - along[:, None, None] * common[..., None, :, :]).reshape(means.shape))
 
-    def determinant(self, share: Floats) -> Floats:
+    def determinant(self, session_ratio: Floats) -> Floats:
         """Compute ln |Σ|/|S ⊗ I|, (...), for ρ (..., k)."""
-        return np.asarray(-np.log(self._weights(share)).sum(-1))
+        return np.asarray(-np.log(self._weights(session_ratio)).sum(-1))
 
     def take(self, columns: Integers) -> NormalEquations:
         """Choose columns (c, q), (..., c, q, q)."""
@@ -272,16 +274,18 @@ class NormalEquations:
 
     def solve(self, *, passes: int) -> LeastSquares:
         """Fit the last of the columns with the weights W, and ρ of its residuals after `passes` iterations."""
-        share = self.share(passes=passes)
-        return LeastSquares(solve_normal(self.for_fit(share)[0])[0], self.covariance(share), share)
+        session_ratio = self.session_ratio(passes=passes)
+        return LeastSquares(
+            solve_normal(self.for_fit(session_ratio)[0])[0], self.covariance(session_ratio), session_ratio
+        )
 
-    def covariance(self, share: Floats) -> Floats:
+    def covariance(self, session_ratio: Floats) -> Floats:
         """Compute the covariance (..., p, p) of a fit of the last column with the weights W, for ρ (..., k)."""
-        weighted, scattered = self.for_fit(share)
+        weighted, scattered = self.for_fit(session_ratio)
         inverse = solve_normal(weighted)[1]
         return np.asarray(inverse + inverse @ (scattered - weighted)[..., :-1, :-1] @ inverse)
 
-    def share(self, *, passes: int) -> Floats:
+    def session_ratio(self, *, passes: int) -> Floats:
         """Estimate ρ (..., k) from the residuals of a fit of the last column, after `passes` iterations from 0.
 
         The scatter of the sessions' means along an axis about their common mean m is expected to be
@@ -291,15 +295,15 @@ class NormalEquations:
         where h of their s − 1 degrees of freedom are used by the fit.
         """
         freedom, k, batch = len(self.sizes) - 1, self.outputs, self.within.shape[:-2]
-        share = np.zeros((*batch, k))
+        session_ratio = np.zeros((*batch, k))
         if not passes:
-            return share
+            return session_ratio
         means, total = self._about_common(self.means), self.sizes.sum()
         columns = means[..., :-1]
         for count in range(passes if freedom else 0):
-            step, covariance = solve_normal(self.at(share)) if count else self._without_scatter
+            step, covariance = solve_normal(self.at(session_ratio)) if count else self._without_scatter
             between = (means[..., -1] - (columns @ step[..., None])[..., 0]) ** 2
-            used = ((columns @ covariance) * columns).sum(-1) * self._weights(share)
+            used = ((columns @ covariance) * columns).sum(-1) * self._weights(session_ratio)
             each, taken = self._of_outputs(between), self._of_outputs(used)
             own, common = (
                 scatter / np.maximum(k_left, 0.1) - freedom
@@ -308,8 +312,10 @@ class NormalEquations:
                     (each.mean(-1, keepdims=True), 1 - taken.mean(-1, keepdims=True) / freedom),
                 )
             )
-            share = np.clip((own + common) / 2 / (total - (self.sizes**2).sum() / total), 0.0, _MOST_SCATTER)
-        return np.where(self.estimated, share, UNKNOWN_SHARE)
+            session_ratio = np.clip(
+                (own + common) / 2 / (total - (self.sizes**2).sum() / total), 0.0, _MOST_SCATTER
+            )
+        return np.where(self.estimated, session_ratio, UNKNOWN_RATIO)
 
 
 def solve_normal(normal: Floats) -> tuple[Floats, Floats]:
@@ -334,10 +340,10 @@ def _inverse(matrix: Floats) -> Floats:
     return np.asarray(inverse / scale[..., :, None] / scale[..., None, :])
 
 
-def inverse_root(run: Floats) -> Floats:
+def inverse_root(run_covariance: Floats) -> Floats:
     """Return A⁻¹ = C^−½ V^−½ of S = A Aᵀ, (..., k, k)."""
-    deviation = np.sqrt(np.diagonal(run, axis1=-2, axis2=-1))
-    values, vectors = np.linalg.eigh(run / deviation[..., :, None] / deviation[..., None, :])
+    deviation = np.sqrt(np.diagonal(run_covariance, axis1=-2, axis2=-1))
+    values, vectors = np.linalg.eigh(run_covariance / deviation[..., :, None] / deviation[..., None, :])
     root = (vectors / np.sqrt(values)[..., None, :]) @ np.swapaxes(vectors, -1, -2)
     return np.asarray(root / deviation[..., None, :])
 

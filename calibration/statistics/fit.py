@@ -203,12 +203,12 @@ class Fit:
         risen = variance_ratio * self.risen(self.names[place])
         return -math.copysign((math.sqrt(g**2 + max(a, 1e-300) * risen) - abs(g)) / max(a, 1e-300), g)
 
-    def products(self, runs: Runs, rows: Flags, run: Floats | None = None) -> NormalEquations:
+    def products(self, runs: Runs, rows: Flags, run_covariance: Floats | None = None) -> NormalEquations:
         """Multiply the derivatives and the residual of the runs in `rows` (n,), with the priors, in an S."""
         residual = (runs.y - self.prediction)[rows]
         linear = regression(runs, rows, self.tangents, self.fitted)
-        run = self.noise.run_covariance if run is None else run
-        return linear.products(residual, run, prior_offsets(self.fitted, self.parameters))
+        run_covariance = self.noise.run_covariance if run_covariance is None else run_covariance
+        return linear.products(residual, run_covariance, prior_offsets(self.fitted, self.parameters))
 
     def refitted(self, runs: Runs, rows: Flags, *, for_test: bool = False) -> Fit:
         """Fit again to the runs in `rows` (n,): by one linear step, unless the model is not linear along it.
@@ -217,9 +217,9 @@ class Fit:
         """
         products = self.products(runs, rows)
         refit = products.solve(passes=_PASSES)
-        normal, covariance = products.for_fit(refit.share)[0], refit.covariance
+        normal, covariance = products.for_fit(refit.session_ratio)[0], refit.covariance
         if for_test:
-            normal = products.at(refit.share)
+            normal = products.at(refit.session_ratio)
             covariance = solve_normal(normal)[1]
         step = bounded_step(self.fitted, self.parameters, normal).change
         parameters, prediction = (
@@ -292,24 +292,24 @@ def fit(
     freed = {alike[0].parameter.name for alike in wrong_numbers}
     fitted = tuple(parameter(model, name) for name in names)
     fitted = tuple(replace(p, sigma=None) if p.name in freed else p for p in fitted)
-    run, repeats = estimated or data.noise(used)
-    problem = _Problem(model, fitted, used, run, in_sigma, title)
+    run_covariance, repeats = estimated or data.noise(used)
+    problem = _Problem(model, fitted, used, run_covariance, in_sigma, title)
     with limited_as_one():
-        point, share = _descend(problem, problem.first(dict(start)), target)
+        point, session_ratio = _descend(problem, problem.first(dict(start)), target)
         stopped = spent()
-    at_end = problem.normal(point, share)
+    at_end = problem.normal(point, session_ratio)
     ahead = bounded_step(fitted, point.parameters, at_end)
     free = np.where(ahead.held, 0.0, point.derivative)
     residual = (data.y - point.prediction)[used]
     products = regression(data, used, free, fitted).products(
-        residual, run, prior_offsets(fitted, point.parameters)
+        residual, run_covariance, prior_offsets(fitted, point.parameters)
     )
     linear = products.solve(passes=_PASSES)
-    normal = products.at(linear.share)
+    normal = products.at(linear.session_ratio)
     step, spread = solve_normal(normal)
     nuisances = {p.name for p in model.nuisances}
     offsets = [p.offset(point.parameters[p.name]) if p.name in nuisances else 0.0 for p in fitted]
-    inflation = _inflation(repeats, len(run))
+    inflation = _inflation(repeats, len(run_covariance))
     return Fit(
         model=model,
         parameters=point.parameters,
@@ -318,14 +318,14 @@ def fit(
         covariance=inflation * certain_where_held(linear.covariance, ahead.held, fitted),
         repeats=repeats,
         inflation=inflation,
-        freedom=_freedom(products, linear.share, len(names)),
+        freedom=_freedom(products, linear.session_ratio, len(names)),
         prediction=point.prediction,
         jacobian=point.derivative,
-        noise=Noise(run, linear.share),
-        deviance=float(normal[-1, -1] + products.determinant(linear.share)),
+        noise=Noise(run_covariance, linear.session_ratio),
+        deviance=float(normal[-1, -1] + products.determinant(linear.session_ratio)),
         converged=ahead.promise < _UNSETTLED * problem.noise_level(at_end),
         held=ahead.held,
-        full_normal=point.products.for_fit(linear.share)[0],
+        full_normal=point.products.for_fit(linear.session_ratio)[0],
         wrong_numbers=wrong_numbers,
         tested=(np.array(offsets) + step, np.diag(certain_where_held(spread, ahead.held, fitted))),
         stopped=stopped,
@@ -364,17 +364,17 @@ class _Problem:
     model: ForwardModel
     fitted: tuple[Parameter, ...]
     used: Flags
-    run: Floats
+    run_covariance: Floats
     in_sigma: bool
     title: str
 
-    def normal(self, point: _Point, share: Floats) -> Floats:
+    def normal(self, point: _Point, session_ratio: Floats) -> Floats:
         """Return the products of a point with the weights of the fit, (p + 1, p + 1)."""
-        return self.weighted(point.products, share)
+        return self.weighted(point.products, session_ratio)
 
-    def weighted(self, products: NormalEquations, share: Floats) -> Floats:
+    def weighted(self, products: NormalEquations, session_ratio: Floats) -> Floats:
         """Return products with the weights of the fit, (p + 1, p + 1)."""
-        return products.at(share) if self.in_sigma else products.for_fit(share)[0]
+        return products.at(session_ratio) if self.in_sigma else products.for_fit(session_ratio)[0]
 
     def noise_level(self, normal: Floats) -> float:
         """Compute rᵀ W r over its degrees of freedom: by so much may it change before anything is learnt.
@@ -420,10 +420,10 @@ class _Problem:
     def products(self, derivative: Floats, residual: Floats, offsets: Floats | None = None) -> NormalEquations:
         """Multiply derivatives (n, k, p) and a residual (n', k), with the priors of parameters `offsets` off."""
         return regression(self.model.runs, self.used, derivative, self.fitted).products(
-            residual, self.run, offsets
+            residual, self.run_covariance, offsets
         )
 
-    def bent(self, point: _Point, share: Floats, step: _FitStep) -> _FitStep:
+    def bent(self, point: _Point, session_ratio: Floats, step: _FitStep) -> _FitStep:
         """Bend a damped step along the curvature of the model, by two more predictions: it stays in a bent valley.
 
         Source: geodesic acceleration, Transtrum and Sethna (2012).
@@ -436,7 +436,7 @@ class _Problem:
         curvature = (beside(_PROBE) + beside(-_PROBE) - 2 * point.prediction) / _PROBE**2
         if not np.isfinite(curvature).all():
             return step
-        normal = self.weighted(self.products(point.derivative, -curvature[self.used] / 2), share)
+        normal = self.weighted(self.products(point.derivative, -curvature[self.used] / 2), session_ratio)
         further = bounded_step(self.fitted, step.parameters, _damped(self.fitted, normal, step.damping)).change
         turn, length = (np.linalg.norm(c / typical_sizes(self.fitted)) for c in (further, step.change))
         if turn > _MOST_BENT * length:
@@ -461,15 +461,15 @@ def _descend(problem: _Problem, point: _Point, target: float) -> tuple[_Point, F
     least, kept = 0, False  # place of the least damping allowed; whether the derivatives are of another point
     refused = False  # whether the step before did not improve the fit
     solved = True  # whether the model could be solved wherever it was tried
-    share, estimates = point.products.share(passes=0), 0
+    session_ratio, estimates = point.products.session_ratio(passes=0), 0
     for count in range(1, _MOST_STEPS + 1):
-        normal = problem.normal(point, share)
+        normal = problem.normal(point, session_ratio)
         step = _step(fitted, point.parameters, normal, least)
         # The scatter of the sessions comes from the residuals of the fit, but only near the solution: far from it
         # every session looks shifted, and with a large ρ the search would stop there. It settles, or is kept.
         if estimates < _ESTIMATES and step.promise < _NEAR * problem.noise_level(normal) and count > 1:
-            share, estimates = point.products.share(passes=_PASSES), estimates + 1
-            normal = problem.normal(point, share)
+            session_ratio, estimates = point.products.session_ratio(passes=_PASSES), estimates + 1
+            normal = problem.normal(point, session_ratio)
             step = _step(fitted, point.parameters, normal, least)
         small = _SMALL * problem.noise_level(normal)
         if step.promise < small and count > 1:
@@ -481,11 +481,11 @@ def _descend(problem: _Problem, point: _Point, target: float) -> tuple[_Point, F
             break
         in_valley = step.damping > 0 and count > _TRIED and solved  # elsewhere to bend costs more than it gains
         if in_valley:
-            step = problem.bent(point, share, step)
+            step = problem.bent(point, session_ratio, step)
         short = not in_valley and bool(np.abs(step.change).max() <= _SHORT)
         doubtful = not short and (refused or not solved)  # its derivatives follow where it is not refused as well
         tried = problem.at(step.parameters, point.derivative if short or doubtful else None, count + 1)
-        fall = float(normal[-1, -1] - problem.normal(tried, share)[-1, -1])
+        fall = float(normal[-1, -1] - problem.normal(tried, session_ratio)[-1, -1])
         if doubtful and tried.solved and fall > -small:
             tried = problem.at(step.parameters, None, count + 1)
         solved = solved and tried.solved
@@ -503,7 +503,7 @@ def _descend(problem: _Problem, point: _Point, target: float) -> tuple[_Point, F
             least, refused = max(step.damping + 1 + refused, 2), True  # each costs as much as one that does
             if least >= len(_DAMPING):
                 break
-    return point, share
+    return point, session_ratio
 
 
 def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: Floats, least: int) -> _FitStep:
@@ -581,15 +581,17 @@ def _inflation(repeats: float, outputs: int) -> float:
     return repeats / (repeats - outputs - 1) * (1 + (outputs - 1) / (repeats - outputs))
 
 
-def _freedom(products: NormalEquations, share: Floats, count: int) -> Floats:
+def _freedom(products: NormalEquations, session_ratio: Floats, count: int) -> Floats:
     """Estimate the degrees of freedom of the parameters' variances, (p,)."""
     least = 1 / products.sizes.mean()
-    steps = 0.01 * share + 1e-3 * least
-    shares = np.vstack([share, share + np.diag(steps)])
-    variances = [np.diag(products.covariance(s))[:count] for s in shares]
+    steps = 0.01 * session_ratio + 1e-3 * least
+    session_ratios = np.vstack([session_ratio, session_ratio + np.diag(steps)])
+    variances = [np.diag(products.covariance(s))[:count] for s in session_ratios]
     V, *near = np.maximum(variances, 1e-100)
     slopes = (np.array(near) - V) / steps[:, None]
-    error = math.sqrt(2 / max(len(products.sizes) - 1, 1)) * np.where(products.estimated, share + least, 0.0)
+    error = math.sqrt(2 / max(len(products.sizes) - 1, 1)) * np.where(
+        products.estimated, session_ratio + least, 0.0
+    )
     variance = (((slopes + slopes.mean(0)) / 2 * error[:, None]) ** 2).sum(0)
     return np.asarray(np.clip(2 * V**2 / np.maximum(variance, 1e-12 * V**2), 1.0, 1e6))
 

@@ -127,7 +127,7 @@ class Scores:
     survived: Floats  # (..., e) |d_j| / |W ∂f/∂ε_j|
     length: Floats  # (..., e) |d_j|: signal per unit of the effect, in standard deviations
     shapes: Floats  # (..., k, f) z of each output along each feature
-    share: Floats  # (..., k) ρ
+    session_ratio: Floats  # (..., k) ρ
 
 
 @dataclass(frozen=True)
@@ -179,21 +179,24 @@ class _Tester:
 
         Each residual is judged in its own noise.
         """
-        run = self.design.noise(residual)
-        products, root = self.design.products(residual, run), inverse_root(run)  # (B, k, k)
+        run_covariance = self.design.noise(residual)
+        products, root = self.design.products(residual, run_covariance), inverse_root(run_covariance)  # (B, k, k)
         base = products.take(np.array([[*range(self.p), -1]]))
         projected = projected_scores(products, self.p)
-        shares = base.share(passes=_PASSES)
-        share, (step, covariance) = shares[:, 0], (part[:, 0] for part in solve_normal(base.at(shares)))
+        session_ratios = base.session_ratio(passes=_PASSES)
+        session_ratio, (step, covariance) = (
+            session_ratios[:, 0],
+            (part[:, 0] for part in solve_normal(base.at(session_ratios))),
+        )
         white = residual * self.design.scale[:, None] - np.einsum("nkp,bp->bnk", self.J, step, optimize=True)
-        white = self.design.shrink(white @ np.swapaxes(root, -1, -2), share)
+        white = self.design.shrink(white @ np.swapaxes(root, -1, -2), session_ratio)
         lack = ((self.means @ white) ** 2).sum((-1, -2))
         at_places = self.places @ white
         kernel = np.einsum("bik,ij,bjk->b", at_places, self.K, at_places, optimize=True)
-        shapes = self._shapes(covariance, white, root, share)
-        largest = np.abs(shapes).max((-1, -2)) if shapes.size else np.zeros(len(share))
+        shapes = self._shapes(covariance, white, root, session_ratio)
+        largest = np.abs(shapes).max((-1, -2)) if shapes.size else np.zeros(len(session_ratio))
         pull = self._largest_pull(step, covariance)
-        return Scores(np.stack([lack, kernel, largest, pull], -1), *projected, shapes, share)
+        return Scores(np.stack([lack, kernel, largest, pull], -1), *projected, shapes, session_ratio)
 
     def _largest_pull(self, step: Floats, covariance: Floats) -> Floats:
         """Compute the largest pull of a nuisance parameter, (B,); of those of which the runs say something."""
@@ -203,11 +206,11 @@ class _Tester:
         pulls = np.abs(step[:, known]) / np.sqrt(np.maximum(removed, LEARNT * prior))
         return np.asarray(np.where(removed > LEARNT * prior, pulls, 0.0).max(-1, initial=0.0))
 
-    def _shapes(self, covariance: Floats, white: Floats, root: Floats, share: Floats) -> Floats:
+    def _shapes(self, covariance: Floats, white: Floats, root: Floats, session_ratio: Floats) -> Floats:
         """Compute z of every output along every feature, (B, k, f), of residuals that are white in Σ."""
         count, k = len(white), white.shape[-1]
-        score = np.einsum("nf,bnk,bka->baf", self.F, self.design.shrink(white, share), root, optimize=True)
-        less = 1 / (1 + share[:, None, :] * self.design.sizes[:, None]) - 1  # Σ⁻¹ of the sessions' means
+        score = np.einsum("nf,bnk,bka->baf", self.F, self.design.shrink(white, session_ratio), root, optimize=True)
+        less = 1 / (1 + session_ratio[:, None, :] * self.design.sizes[:, None]) - 1  # Σ⁻¹ of the sessions' means
         of_means = np.einsum("bik,bsi,bia->bska", root, less, root, optimize=True)
         absorbed = np.einsum("bik,bia,fkp->bafp", root, root, self.FJ, optimize=True)
         absorbed += np.einsum("bska,sfkp->bafp", of_means, self.FJ_means, optimize=True)
@@ -243,7 +246,7 @@ def projected_scores(products: NormalEquations, p: int) -> tuple[Floats, Floats,
     e = products.within.shape[-1] - p - 1
     columns = np.array([[*range(p), p + j, p + e] for j in range(e)], dtype=np.int64).reshape(e, p + 2)
     part = products.take(columns)
-    normal = part.at(part.share(passes=_PASSES_OF_A_SCORE))  # (..., e, p + 2, p + 2)
+    normal = part.at(part.session_ratio(passes=_PASSES_OF_A_SCORE))  # (..., e, p + 2, p + 2)
     left = schur_complement(normal, p)
     length = np.sqrt(np.maximum(left[..., 0, 0], 1e-300))
     survived = length / np.sqrt(np.maximum(normal[..., p, p], 1e-300))
@@ -273,12 +276,14 @@ def examine_residual(
     exact = regression(data, used, columns, (), tester.design.repeated).products(residual)
     testable = observed.survived[0] >= TESTABLE
     rng = np.random.default_rng(study.seed)
-    run = tester.design.noise(residual)
+    run_covariance = tester.design.noise(residual)
     statistics = np.append(observed.general[0], _largest(observed.z, testable))
     batches: list[Floats] = []
     while (drawn := sum(map(len, batches))) < (draws or study.draws):
         count = min(_AT_ONCE, max(1, _VALUES // residual.size), (draws or study.draws) - drawn)
-        null = tester.scores(tester.design.draw(rng, run, np.tile(observed.share[0], (count, 1))))
+        null = tester.scores(
+            tester.design.draw(rng, run_covariance, np.tile(observed.session_ratio[0], (count, 1)))
+        )
         batches.append(np.column_stack([null.general, _largest(null.z, testable)]))
         if drawn + count >= _FEWEST_DRAWS and skipped("more draws of some tests"):
             break

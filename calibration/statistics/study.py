@@ -2,7 +2,7 @@
 
 **Groups.** Sessions, or blocks of conditions if sessions are few, are held out or left out together. Blocks are
 drawn from the conditions within a session; repeats stay together. The shift of a single session cannot be
-estimated. Its variance is taken to be `gls.UNKNOWN_SHARE`, so a shift of all its runs is no evidence.
+estimated. Its variance is taken to be `gls.UNKNOWN_RATIO`, so a shift of all its runs is no evidence.
 
 **Outliers** are runs that are far from their own repeats, for example because of a misplaced decimal point. If, in
 one output, the runs of a condition are more than `FAR` robust standard deviations apart, the run that is farthest

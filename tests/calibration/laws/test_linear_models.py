@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from calibration.laws.search import LinearModels
-from calibration.linear.gls import UNKNOWN_SHARE, Noise, Regression, repeat_covariance
+from calibration.linear.gls import UNKNOWN_RATIO, Noise, Regression, repeat_covariance
 from common.arrays import Floats
 
 SESSION = np.repeat([0, 1, 2, 3], [6, 8, 6, 4])
@@ -54,15 +54,15 @@ def test_gains_and_weights_are_those_of_dense_matrices() -> None:
     models, residual = design(), residuals(60)
     fits = models.fit(residual)
     single = design(np.zeros_like(SESSION)).fit(residual[:2])  # of a single session ρ is the largest
-    assert single.base_share == pytest.approx(UNKNOWN_SHARE)
+    assert single.base_session_ratio == pytest.approx(UNKNOWN_RATIO)
     absorbed = models.design.columns[..., : len(PRECISION)]
     for b, one in enumerate(residual[:2]):
         alone = models.fit(one[None])
         np.testing.assert_allclose(fits.gain[b], alone.gain[0], rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(fits.weights[b], alone.weights[0], rtol=1e-7, atol=1e-12)
-        without = dense(one, fits.base_share[b], absorbed)[0]
+        without = dense(one, fits.base_session_ratio[b], absorbed)[0]
         shares = [
-            Regression(every, PRECISION, SESSION, None, CONDITION).products(one).solve(passes=3).share
+            Regression(every, PRECISION, SESSION, None, CONDITION).products(one).solve(passes=3).session_ratio
             for place in range(PLACES)
             for every in [np.concatenate([absorbed, models.columns[:, :, place]], -1)]
         ]

@@ -106,7 +106,7 @@ def test_noise_is_recovered_from_repeats_and_sessions() -> None:
         y = rng.normal(size=(60, 2))[condition] + scatter + shift
         covariances.append(repeat_covariance(y, condition, scale))
         linear = Regression(J, np.zeros(1), session, scale)
-        shares.append(linear.products(scatter + shift, covariances[-1]).share(passes=3))
+        shares.append(linear.products(scatter + shift, covariances[-1]).session_ratio(passes=3))
     assert np.sqrt(np.diag(np.mean(covariances, 0))) == pytest.approx([0.03, 0.05], rel=0.02)
     assert np.mean(shares, 0) == pytest.approx([0.25, 0.15], rel=0.12)
 
@@ -121,7 +121,7 @@ def test_scores_along_features_are_those_of_least_squares() -> None:
     _, table = features(model.runs, used)
     J = fitted.jacobian[used]
     residual = (model.runs.y - fitted.prediction)[used] + J @ prior_offsets(fitted.fitted, fitted.parameters)
-    noise = Noise(repeat_covariance(residual, model.runs.condition[used]), scores.share)
+    noise = Noise(repeat_covariance(residual, model.runs.condition[used]), scores.session_ratio)
     white = noise.whitener(model.runs.session[used])
     prior = np.diag(np.sqrt(precisions(fitted.fitted)))
     for output, feature in ((0, 0), (2, 3), (4, 1)):

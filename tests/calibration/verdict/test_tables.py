@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.linear.gls import UNKNOWN_SHARE
+from calibration.linear.gls import UNKNOWN_RATIO
 from calibration.statistics.study import middle_session
 from calibration.swimmer.measured_table import PROTOCOLS, read_measurements
 from common.errors import InputError, run_command
@@ -119,7 +119,7 @@ def test_a_single_session_gives_a_weaker_conclusion() -> None:
     table["omega_h_rpm"] *= 0.98
     shifted = calibrated(table, few=True)
     assert shifted.verdict == "none"
-    assert (shifted.base.noise.session_ratio == UNKNOWN_SHARE).all()
+    assert (shifted.base.noise.session_ratio == UNKNOWN_RATIO).all()
 
 
 def test_two_sessions_kept_whole_are_not_called_blocks() -> None:
