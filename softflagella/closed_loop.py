@@ -16,7 +16,7 @@ from calibration.own_model.declared import Model
 from calibration.own_model.model_verdict import ModelVerdict
 from calibration.own_model.table_of_runs import Noise, Roles, read_runs_of
 from calibration.statistics.budget import Work, limited
-from calibration.statistics.owned import Owned, read_owned
+from calibration.statistics.lab_settings import LabSettings, read_lab_settings
 from calibration.table.runs import lines_of_excluded
 from calibration.verdict.calibrate import calibrate as find_what_is_missing
 from common.errors import InputError
@@ -38,7 +38,7 @@ def calibrate(
     *,
     protocol: Literal["session", "paper"] = "session",
     seed: int = 0,
-    own: Owned | Sequence[str] | None = None,
+    own: LabSettings | Sequence[str] | None = None,
     laws: bool = True,
     paths: Sequence[str] = (),
     unit: LengthUnit | None = None,
@@ -115,7 +115,7 @@ def calibrate(
     roles = Roles(session, specimen, held_out, noise, notes)
     if isinstance(robot, Model):
         _refuse("a model of your own", laws=not laws, paths=paths, unit=unit, protocol=protocol != "session")
-        given = own if isinstance(own, Mapping) else read_owned(own or ())
+        given = own if isinstance(own, Mapping) else read_lab_settings(own or ())
         with limited(limit):
             experiment, rows = read_runs_of(table, robot, roles, own=given, title="checks" if progress else "")
             for line in (*experiment.runs.converted, *lines_of_excluded(experiment.runs)):

@@ -14,8 +14,8 @@ from calibration.laws.laws import find_laws
 from calibration.robot.corrected_robot import check_given
 from calibration.robot.robot_verdict import RobotVerdict, read_runs
 from calibration.statistics.budget import Work
-from calibration.statistics.owned import Owned
-from calibration.swimmer.possible_runs import owned
+from calibration.statistics.lab_settings import LabSettings
+from calibration.swimmer.possible_runs import lab_settings
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate
 from common.units import LengthUnit
@@ -30,7 +30,7 @@ def calibrate_robot(
     name: str,
     protocol: Literal["session", "paper"],
     seed: int,
-    own: Owned | Sequence[str] | None,
+    own: LabSettings | Sequence[str] | None,
     laws: bool,
     paths: Sequence[str],
     unit: LengthUnit | None,
@@ -43,7 +43,7 @@ def calibrate_robot(
     robot = one_robot(robot)
     check_given(robot)
     wanted = wanted_paths(paths, robot, unit)
-    settings = own if isinstance(own, Mapping) else owned(own or ())
+    settings = own if isinstance(own, Mapping) else lab_settings(own or ())
     data, rows = read_runs(table, protocol, tell)
     result = calibrate(
         SwimmerModel(robot, data, jobs, own=settings),

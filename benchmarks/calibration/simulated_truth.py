@@ -47,8 +47,8 @@ def simulated(sizes: Mapping[str, float], seeds: list[int]) -> list[Experiment]:
         if bad.any():
             print(f"{dict(sizes)}: {bad.sum()} conditions did not settle", file=sys.stderr)
             direct = DIRECT.steady({k: v[bad] for k, v in columns.items()}, **options)
-            for name, values in answer.items():
-                values[bad] = direct[name]
+            for name in answer.keys() & direct.keys():  # the direct solution has no stability
+                answer[name][bad] = direct[name]
         return answer
 
     finer = replace(model, solver=DIRECT._replace(steady=steady))

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibration.statistics.owned import Owned, read_owned
+from calibration.statistics.lab_settings import LabSettings, read_lab_settings
 from calibration.swimmer.measured_table import Measurements
 from common.arrays import Floats
 from common.errors import InputError
@@ -75,14 +75,14 @@ def _all_spins(factor: float) -> str:
     return f"; or the spins of motor, head and tails are all in {meant} where {stated} is stated"
 
 
-def owned(entries: Sequence[str]) -> dict[str, tuple[float, ...]]:
+def lab_settings(entries: Sequence[str]) -> dict[str, tuple[float, ...]]:
     """Read the settings that a lab has, of a robot."""
-    settings = read_owned(entries)
-    check_owned(settings)
+    settings = read_lab_settings(entries)
+    check_lab_settings(settings)
     return settings
 
 
-def check_owned(own: Owned) -> None:
+def check_lab_settings(own: LabSettings) -> None:
     """Refuse settings that no run can have."""
     for name, values in own.items():
         if name not in SETTINGS:
@@ -97,7 +97,7 @@ def check_owned(own: Owned) -> None:
                 )
 
 
-def possible_settings(runs: Measurements, own: Owned) -> Floats:
+def possible_settings(runs: Measurements, own: LabSettings) -> Floats:
     """List N, l_cm and omega_rpm of every run that can be made next, (m, 3); both directions."""
     cm, rpm = 100 * runs.length, np.abs(runs.omega).max() * 30 / math.pi
     default = {

@@ -19,7 +19,7 @@ import numpy as np
 from calibration.linear.gls import Noise, repeat_covariance
 from calibration.statistics.budget import count_predictions
 from calibration.statistics.forward import either_side, secants, stacked
-from calibration.statistics.owned import Owned
+from calibration.statistics.lab_settings import LabSettings
 from calibration.statistics.statistical_model import Parameter, Parameters, Predict
 from calibration.swimmer.influences import (
     CAMERA,
@@ -39,7 +39,7 @@ from calibration.swimmer.influences import (
 )
 from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.observation import Observation
-from calibration.swimmer.possible_runs import check_inputs, check_outputs, check_owned, possible_settings
+from calibration.swimmer.possible_runs import check_inputs, check_lab_settings, check_outputs, possible_settings
 from common.arrays import Flags, Floats, Integers
 from common.errors import InputError
 from sim.effects import effect_named, is_effect
@@ -92,12 +92,12 @@ class SwimmerModel:
     runs: Measurements
     jobs: int | None = None
     solver: Solver = DIRECT
-    own: Owned = field(default_factory=dict)  # settings that the lab has for its next runs
+    own: LabSettings = field(default_factory=dict)  # settings that the lab has for its next runs
 
     def __post_init__(self) -> None:
         """Refuse lengths and speeds that are not possible, before anything is simulated."""
         check_inputs(self.robot, self.runs)
-        check_owned(self.own)
+        check_lab_settings(self.own)
 
     @property
     def coefficients(self) -> tuple[Parameter, ...]:

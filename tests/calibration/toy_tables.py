@@ -19,7 +19,7 @@ from calibration.laws.laws import Laws, find_laws
 from calibration.laws.places import place_named
 from calibration.robot.robot_verdict import RobotVerdict
 from calibration.statistics.fit import Fit, fit
-from calibration.statistics.owned import Owned
+from calibration.statistics.lab_settings import LabSettings
 from calibration.statistics.statistical_model import start_values
 from calibration.statistics.study import Study
 from calibration.swimmer.influences import influences
@@ -80,7 +80,7 @@ def toy_table(
         return make_table(robot, seed=seed, lengths_cm=lengths_cm, title="", **design or {})
 
 
-def toy_swimmer(table: pd.DataFrame, robot: Robot = START, own: Owned | None = None) -> SwimmerModel:
+def toy_swimmer(table: pd.DataFrame, robot: Robot = START, own: LabSettings | None = None) -> SwimmerModel:
     return SwimmerModel(robot, read_measurements(table), solver=toy.SOLVER, own=own or {})
 
 

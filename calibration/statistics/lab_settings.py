@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 
 from common.errors import InputError
 
-Owned = Mapping[str, tuple[float, ...]]  # column of a table -> values
+LabSettings = Mapping[str, tuple[float, ...]]  # column of a table -> values
 
 
-def read_owned(entries: Sequence[str]) -> dict[str, tuple[float, ...]]:
+def read_lab_settings(entries: Sequence[str]) -> dict[str, tuple[float, ...]]:
     """Read settings from entries such as "l_cm=5,7,9", by the columns of a table."""
     settings: dict[str, tuple[float, ...]] = {}
     for entry in entries:
