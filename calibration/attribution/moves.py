@@ -8,12 +8,11 @@ same in all runs. So before an effect is looked for, each number may differ in e
 as far as their runs have partners: every pair of N and l of a group (`Runs.partners`) must be outside it, too.
 Else a shift is no different from an effect of N or l. A number that differs by x in the group G has the derivative
 ∂f/∂x = ∂f/∂p in the runs of G, and 0 in the others. So every pair of number and group has a score
-(`calibration.statistics.residual_tests`), and costs no simulation. The largest is taken to be real if it is beyond
-what a bootstrap of all scores gives at a quarter of the level, beyond `CERTAIN` standard deviations of what the
-fit with it leaves (its Birge factor counts), and credible: at most `CREDIBLE` tolerances of the number, or any
-angle for the zero of the course. Its fit must gain more than one parameter can by chance. Of pairs that cannot be
-told apart the one comes first that is off by the fewest of its tolerances, a coefficient before a number; the
-others are named with it. With it in the fit, a second one is looked for.
+(`calibration.statistics.residual_tests`), and costs no simulation. The largest is fitted, with those
+near it, if it is beyond what a bootstrap of all scores gives at a quarter of the level, and judged by
+`calibration.attribution.rules`. Of pairs that cannot be told apart the one comes first that is off by the fewest
+of its tolerances, a coefficient before a number; the others are named with it. With it in the fit, a second one
+is looked for.
 
 The zero of the course shows only with a current, and a score is its derivative at the same zero in all runs. So a
 number with a grid is fitted in each group where another number has a large score, from all values of the grid.

@@ -14,16 +14,10 @@ likelihood of the model that is linear about the fit with it (Lindstrom and Bate
 
 What the form leaves counts as noise: variances are multiplied by b = max(1, χ²/ν) of that remainder (Birge 1932).
 
-A form is adopted if
-
-1. nothing explains the residual, and its fit converged;
-2. its gain on left-out groups of runs, paired over conditions, has a 95 % interval above zero, or is consistent
-   over them (`calibration.attribution.left_out`). The size of a specimen that is left out as a whole is the mean;
-3. on these left-out runs it removes at least half of what the model without it leaves beyond noise, if that is
-   known;
-4. its mean size differs from the null. With one size, its interval says so; with several, a t-test over the sizes
-   that the specimens ask for on their own, either sign allowed, by one linear step without the spread. The
-   interval of a size that varies in its logarithm must stay within a factor of 100.
+Where nothing explains the residual, forms are judged by `calibration.attribution.rules`: by their gain on left-out
+groups of runs, where the size of a specimen that is left out as a whole is the mean; and by their size. Where
+sizes differ, a t-test compares the mean of those that the specimens ask for on their own, either sign allowed, by
+one linear step without the spread, with the null.
 
 Sizes differ if the restricted likelihood gains by it: -2 ln of its ratio is above 2.71, the 95 % quantile where a
 variance is at its bound of zero (Self and Liang 1987). Of the forms adopted the one with the largest gain is

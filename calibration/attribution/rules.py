@@ -3,8 +3,8 @@
 Rules stand in the order in which they are applied, the cheapest first. Evidence is measured when a rule weighs it:
 the first rule that refuses a hypothesis is its reason, and what later rules would have weighed stays untested.
 They differ between origins on purpose. An effect that is claimed must leave no more than noise, while an effect
-that is adopted as a description need not, but must predict runs that it has not seen; a number must be off by no
-more than is credible.
+that is adopted as a description need not, but must predict runs that it has not seen; a number that differs in
+some runs must be off by no more than is credible.
 """
 
 from __future__ import annotations
