@@ -66,7 +66,7 @@ class TableReader:
         self.columns: dict[str, Any] = {name: self._values(name) for name in others}  # (n,) each
         self.missing = table[outputs].isna()
         self.faults: dict[int, Excluded] = {}  # of rows, by their places; the first fault of a row counts
-        self.set_aside((original == list(original)).all(axis=1), "the header again")
+        self.set_aside((original.astype(str) == [*map(str, original)]).all(axis=1), "the header again")
         self.set_aside(self.missing.all(axis=1), "no output has a value")
         self.set_aside_lacking(declared.needed)
         for name in outputs:

@@ -1,5 +1,5 @@
 /* Playing a plan: time, speed, the robot's pose, the state of its motor. Lengths in cm, times in s. */
-import { clip, placeBelow, runningSum } from "../math.js";
+import { clip, indexBelow, runningSum } from "../math.js";
 import { byId, clock, element } from "./dom.js";
 
 const SPEEDS = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
@@ -73,7 +73,7 @@ class Player {
 
 /* The pose at a time, and the number of the dwell: linear between the samples of the track. */
 function poseAt(plan, ends, time) {
-  const low = clip(placeBelow(ends, time), 0, plan.dwells.length - 1);
+  const low = clip(indexBelow(ends, time), 0, plan.dwells.length - 1);
   const share = clip((time - ends[low]) / plan.dwells[low], 0, 1) * plan.samples;
   const sample = Math.min(Math.floor(share), plan.samples - 1);
   const before = plan.motion[low * plan.samples + sample], after = plan.motion[low * plan.samples + sample + 1];
