@@ -158,7 +158,7 @@ def _seen(robot: Robot, hardware: Hardware) -> np.ndarray:
 def answer(verdict: Verdict, case: HardwareCase) -> str:
     """Say whether a verdict names what is off."""
     claims = (*verdict.claims, *verdict.attribution.rival_effects)
-    names = [e.name for c in claims for e in c.added] + [move.effect.title for move in verdict.moves]
+    names = [e.name for c in claims for e in c.added] + [move["words"] for move in verdict.facts["moves"]]
     claimed = bool(names) or bool(verdict.wrong_numbers)
     names += [verdict.nearest.effect.name] if verdict.nearest else []  # a description, and no claim
     if any(word in name for word in case.named for name in names) or not (case.named or claimed):

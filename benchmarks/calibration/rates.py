@@ -93,7 +93,7 @@ def answers(verdict: Verdict, case: RateCase) -> dict[str, bool]:
         _WRONG: verdict.verdict == "number" or bool(verdict.attribution.rival_numbers),
         _UNEXPLAINED: verdict.verdict == "unexplained",
         _MOVED: bool(verdict.moves),
-        _MOVED_NAMED: any(case.planted[0] in move.effect.title for move in verdict.moves),
+        _MOVED_NAMED: any(case.planted[0] in move["words"] for move in verdict.facts["moves"]),
         _ADOPTED: verdict.nearest is not None,
         _RISES: verdict.nearest is not None and not verdict.held_out_error_falls,
         _NAMED: {name} in (*sets, *beside),

@@ -99,7 +99,7 @@ def wrong_number_as_hypothesis(study: Study, base: Fit, tangents: Directions) ->
         return None
     off = tuple(p for p in pulls(freed, study.model.nuisances) if p.freed)
     wrong = tuple(alike[0].parameter for alike in freed.wrong_numbers)
-    measures = {"remainder": lambda h: examine_residual(study, h.fitted, tangents)}
+    measures = {"remainder": lambda h: examine_residual(study, h.fitted, tangents, decide=study.level)}
     return judge(Hypothesis(Origin.NUMBER, wrong, freed, Evidence(pulls=off)), Trial(study, base, measures), RULES)
 
 
