@@ -14,7 +14,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-import calibration.verdict.calibrate
+import calibration.verdict.explain
 import sim.motion.run
 from common.errors import InputError, run_command
 from dataset.simulate import simulate
@@ -134,7 +134,7 @@ def test_any_table_of_runs(
     runs = runs.assign(elapsed_min=4.0 * np.arange(len(runs)), v_cm_s=1.0 + 0.01 * np.arange(len(runs)))
     data.draw(changed(runs)).to_csv(tmp_path / "runs.csv", index=False)
     for name in ("examine", "pairs"):
-        monkeypatch.setattr(calibration.verdict.calibrate, name, lambda *_, **__: [])
+        monkeypatch.setattr(calibration.verdict.explain, name, lambda *_, **__: [])
     words = ["calibrate", tmp_path / "runs.csv", "--robot", "paper-measured", "--out", tmp_path / "out"]
     with on_the_toy(few=True):
         answered(["calibration", *words, "--no-laws", "--no-path"], capsys)
