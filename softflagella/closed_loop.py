@@ -112,12 +112,12 @@ def calibrate(
     limit = Work(max_predictions or usual, max_seconds or math.inf)
     if not (isinstance(seed, Integral) and seed >= 0):
         raise InputError(f"seed: {seed}; give a whole number from 0")
+    settings = own if isinstance(own, Mapping) else read_lab_settings(own or ())
     roles = Roles(session, specimen, held_out, noise, notes)
     if isinstance(robot, Model):
         _refuse("a model of your own", laws=not laws, paths=paths, unit=unit, protocol=protocol != "session")
-        given = own if isinstance(own, Mapping) else read_lab_settings(own or ())
         with limited(limit):
-            experiment, rows = read_runs_of(table, robot, roles, own=given, title="checks" if progress else "")
+            experiment, rows = read_runs_of(table, robot, roles, own=settings, title="checks" if progress else "")
             for line in (*experiment.runs.converted, *lines_of_excluded(experiment.runs)):
                 tell(line)
             of_model = partial(ModelVerdict, model=robot, table=_name(table))
@@ -134,7 +134,7 @@ def calibrate(
         name=_name(table),
         protocol=protocol,
         seed=seed,
-        own=own,
+        own=settings,
         laws=laws,
         paths=paths,
         unit=unit,

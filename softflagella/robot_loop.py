@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -15,7 +15,6 @@ from calibration.robot.corrected_robot import check_given
 from calibration.robot.robot_verdict import RobotVerdict, read_runs
 from calibration.statistics.budget import Work
 from calibration.statistics.lab_settings import LabSettings
-from calibration.swimmer.possible_runs import lab_settings
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate
 from common.units import LengthUnit
@@ -30,7 +29,7 @@ def calibrate_robot(
     name: str,
     protocol: Literal["session", "paper"],
     seed: int,
-    own: LabSettings | Sequence[str] | None,
+    own: LabSettings,
     laws: bool,
     paths: Sequence[str],
     unit: LengthUnit | None,
@@ -43,10 +42,9 @@ def calibrate_robot(
     robot = one_robot(robot)
     check_given(robot)
     wanted = wanted_paths(paths, robot, unit)
-    settings = own if isinstance(own, Mapping) else lab_settings(own or ())
     data, rows = read_runs(table, protocol, tell)
     result = calibrate(
-        SwimmerModel(robot, data, jobs, own=settings),
+        SwimmerModel(robot, data, jobs, own=own),
         held_out=rows,
         describe=find_laws if laws else None,
         limit=limit,

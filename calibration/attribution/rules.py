@@ -58,8 +58,8 @@ class Trial:
     single: float = math.inf  # EBIC of the best single effect
 
     def measured(self, hypothesis: Hypothesis, name: str) -> Hypothesis:
-        """Measure a field of the evidence, unless it is known."""
-        if getattr(hypothesis.evidence, name) is not None or name not in self.measures:
+        """Measure a field of the evidence, unless it is known or there is no measure of it."""
+        if name not in self.measures or getattr(hypothesis.evidence, name) is not None:
             return hypothesis
         return hypothesis.seen(**{name: self.measures[name](hypothesis)})
 
@@ -79,7 +79,7 @@ class Rule:
 def judge(hypothesis: Hypothesis, trial: Trial, rules: Sequence[Rule], stage: Stage = Stage.FIT) -> Hypothesis:
     """Return a hypothesis with the reason of the first rule that refuses it, and the evidence measured for it."""
     for rule in _of(rules, stage, hypothesis):
-        hypothesis = trial.measured(hypothesis, rule.weighs) if rule.weighs else hypothesis
+        hypothesis = trial.measured(hypothesis, rule.weighs)
         if rule.applies(hypothesis, trial):
             return replace(hypothesis, reason=rule.reason)
     return replace(hypothesis, reason=Reason.KEPT if stage is Stage.FIT else hypothesis.reason)
@@ -89,7 +89,7 @@ def doubted(hypothesis: Hypothesis, trial: Trial, rules: Sequence[Rule]) -> Hypo
     """Return a hypothesis with all that makes it uncertain."""
     doubts = []
     for rule in _of(rules, Stage.DOUBT, hypothesis):
-        hypothesis = trial.measured(hypothesis, rule.weighs) if rule.weighs else hypothesis
+        hypothesis = trial.measured(hypothesis, rule.weighs)
         if rule.applies(hypothesis, trial):
             doubts.append(rule.reason)
     return replace(hypothesis, doubts=tuple(doubts))
@@ -115,18 +115,18 @@ def _includes_null(h: Hypothesis, trial: Trial) -> bool:
 
     Along a bent valley the covariance alone says nothing.
     """
-    low, high = interval_at_second(h.fitted, h)
+    low, high = interval_at_second(h)
     alike = trial.base.wrong_numbers == h.fitted.wrong_numbers  # otherwise the base lacks more than the effect
     falls = trial.base.deviance - h.fitted.deviance
     return low <= h.effect.start <= high and not (alike and falls > h.fitted.risen(h.effect.name))
 
 
-def interval_at_second(refit: Fit, hypothesis: Hypothesis) -> tuple[float, float]:
+def interval_at_second(hypothesis: Hypothesis) -> tuple[float, float]:
     """Compute the 95 % interval of an effect, with its second number as it was fitted.
 
     A weak effect's size and second number cannot be told apart, and the interval over both would hold the null.
     """
-    effect = hypothesis.effect
+    effect, refit = hypothesis.effect, hypothesis.fitted
     i = refit.names.index(effect.name)
     if effect.second is None or refit.held[i]:
         return refit.interval(effect.name)
@@ -137,13 +137,8 @@ def interval_at_second(refit: Fit, hypothesis: Hypothesis) -> tuple[float, float
     return refit.parameters[effect.name] - half, refit.parameters[effect.name] + half
 
 
-def _number_leaves_residual(h: Hypothesis, trial: Trial) -> bool:
-    return h.evidence.remainder is not None and h.evidence.remainder.p_value < trial.study.level
-
-
-def _leaves_residual(h: Hypothesis, trial: Trial) -> bool:
-    # At half of the level, so that a true effect is not lost too often.
-    return h.evidence.remainder is not None and h.evidence.remainder.p_value < trial.study.level / 2
+def _leaves_residual(h: Hypothesis, level: float) -> bool:
+    return h.evidence.remainder is not None and h.evidence.remainder.p_value < level
 
 
 def predicts_no_better(h: Hypothesis, _: Trial) -> bool:
@@ -222,9 +217,10 @@ RULES = (
     Rule(Stage.FIT, (Origin.PAIR,), Reason.COSTS_MORE, "its extended BIC is above that of the best single effect",
          lambda h, trial: (h.evidence.cost or -math.inf) >= trial.single, "cost"),
     Rule(Stage.FIT, _EFFECTS, Reason.LEAVES_RESIDUAL, "the p-value of the residual that it leaves is below α/2",
-         _leaves_residual, "remainder"),
+         lambda h, trial: _leaves_residual(h, trial.study.level / 2), "remainder"),  # a true one is seldom lost
     Rule(Stage.FIT, (Origin.NUMBER,), Reason.LEAVES_RESIDUAL,
-         "the p-value of the residual that it leaves is below α", _number_leaves_residual, "remainder"),
+         "the p-value of the residual that it leaves is below α",
+         lambda h, trial: _leaves_residual(h, trial.study.level), "remainder"),
     Rule(Stage.FIT, _EFFECTS, Reason.INCLUDES_NULL, "the 95 % interval of the new effect includes its null",
          _includes_null),
     Rule(Stage.FIT, _EFFECTS, Reason.NOT_PREDICTIVE, "the gain over left-out sessions is below its standard error",

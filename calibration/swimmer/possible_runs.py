@@ -11,12 +11,11 @@ to be built, and its fastest speed and slower ones. A lab says what it has as "N
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from calibration.statistics.lab_settings import LabSettings, read_lab_settings
+from calibration.statistics.lab_settings import LabSettings
 from calibration.swimmer.measured_table import Measurements
 from common.arrays import Floats
 from common.errors import InputError
@@ -73,13 +72,6 @@ def _all_spins(factor: float) -> str:
         return ""
     meant, stated = ("rad/s", "rpm") if factor > 1 else ("rpm", "rad/s")
     return f"; or the spins of motor, head and tails are all in {meant} where {stated} is stated"
-
-
-def lab_settings(entries: Sequence[str]) -> dict[str, tuple[float, ...]]:
-    """Read the settings that a lab has, of a robot."""
-    settings = read_lab_settings(entries)
-    check_lab_settings(settings)
-    return settings
 
 
 def check_lab_settings(own: LabSettings) -> None:

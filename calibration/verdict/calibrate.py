@@ -32,7 +32,7 @@ from calibration.attribution.forms import envelope
 from calibration.attribution.hypothesis import Hypothesis
 from calibration.attribution.nearest import for_new_specimen, of_new_specimen, size_interval
 from calibration.attribution.wrong_numbers import pulls
-from calibration.findings.findings import Description
+from calibration.findings.findings import Description, Findings
 from calibration.findings.held_out import HeldOutErrors, held_out_errors
 from calibration.findings.next_runs import Explanation, next_runs
 from calibration.statistics.budget import Work, beginning, limited, skipped
@@ -57,7 +57,7 @@ from calibration.statistics.weights import (
     noise_of_any_run,
     rows_of_little_weight,
 )
-from calibration.table.excluded import caveat_of_excluded, count_of_rows
+from calibration.table.excluded import caveat_of_excluded
 from calibration.table.unit_slips import refuse_unit_slips
 from calibration.verdict.describe import adopt_in_turns, forms_in_question
 from calibration.verdict.explain import explain_and_refute, fit_moves
@@ -119,7 +119,7 @@ def calibrate(
     with_moves, moves = (of_all, moves) if of_all else (attribution.base, attribution.moves)
     attribution = replace(attribution, moves=tuple(replace(move, fit=with_moves) for move in moves))
     catalogue = [e.name for e in model.effects]
-    return verdict(
+    findings = verdict(
         **_concluded(study, attribution, uncalibrated, laws, final_refit(of_all) if of_all else None),
         **_given(given),
         verdict=attribution.verdict(level),
@@ -130,8 +130,9 @@ def calibrate(
             {"level": level, "seed": seed, "catalogue": catalogue, "locked": study.split.names}
         ),
         not_tried=tuple(budget.not_tried),
-        caveats=_caveats(study, model, attribution, budget.not_tried, beside),
+        caveats=(),
     )
+    return replace(findings, caveats=_caveats(findings, model, budget.not_tried, beside))
 
 
 def _concluded(
@@ -289,14 +290,12 @@ def _errors(
     return held_out_errors(study, predictions, base, final)
 
 
-def _caveats(
-    study: Study, model: ForwardModel, attribution: Attribution, ended: Mapping[str, str], beside: str
-) -> tuple[str, ...]:
+def _caveats(findings: Findings, model: ForwardModel, ended: Mapping[str, str], beside: str) -> tuple[str, ...]:
     """Say what weakens the conclusion: what was left out or not tried, and why a fit may not be the best one."""
-    runs, split, base, final = model.runs, study.split, attribution.base, attribution.final
+    runs, split, base, final = findings.runs, findings.split, findings.base, findings.final
     when = next(iter(ended.values()), "")
     not_tried = f"provisional: the search ended {when}, and did not try {', '.join(ended)}"
-    little = rows_of_little_weight(study)
+    little = findings.little_weight
     held = [p for p, on_bound in zip(final.fitted, final.held, strict=True) if on_bound]
     unweighted = with_runs(model, weight=None).runs.subset(split.kept)
     far = far_readings(unweighted, (runs.y - final.prediction)[split.kept])
@@ -317,7 +316,7 @@ def _caveats(
     )  # fmt: skip
     return (
         *runs.caveats,
-        *caveat_of_excluded((*runs.excluded, *split.outliers), len(runs) + count_of_rows(runs.excluded)),
+        *caveat_of_excluded(findings.excluded, findings.rows),
         *split.caveats,
         *([not_tried] if ended else []),
         *caveat_of_weights(little, int(split.kept.sum()), alike(runs, little)),

@@ -12,10 +12,11 @@ import pandas as pd
 import pytest
 
 from calibration.statistics.forward import by_differences, derivatives
+from calibration.statistics.lab_settings import read_lab_settings
 from calibration.statistics.statistical_model import start_values
 from calibration.swimmer.influences import influences
 from calibration.swimmer.measured_table import read_measurements
-from calibration.swimmer.possible_runs import lab_settings, possible_settings
+from calibration.swimmer.possible_runs import check_lab_settings, possible_settings
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
@@ -172,7 +173,7 @@ def test_without_a_word_it_is_what_the_table_has_and_a_lab_gets_only_what_it_has
     assert len(np.unique(grid, axis=0)) == len(grid) == 4 * 3 * 6
     one_length = toy_swimmer(toy_table(3, lengths_cm=(8.0,))).runs
     assert len(possible_settings(one_length, {})) == 4 * 6
-    lab = lab_settings(["N=2,4", "l_cm=5,7", "omega_rpm=60"])
+    lab = read_lab_settings(["N=2,4", "l_cm=5,7", "omega_rpm=60"])
     expected = set(product((2, 4), (5, 7), (60, -60)))
     assert {tuple(row) for row in possible_settings(runs, lab).tolist()} == expected
     lengths = tuple(np.linspace(5.0, 13.0, 17))  # of which six are proposed
@@ -206,7 +207,7 @@ def test_settings_are_those_of_the_lab_to_the_last_digit() -> None:
 )
 def test_what_cannot_be_set_is_refused(entry: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
-        lab_settings([entry])
+        check_lab_settings(read_lab_settings([entry]))
 
 
 def refused(table: pd.DataFrame, words: str) -> None:
