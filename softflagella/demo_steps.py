@@ -164,7 +164,7 @@ CHAINS = (
             "A square, planned with the robot behind the runs, with the corrected one, and with one whose "
             "coefficients alone were fitted, without a search for effects; and swum open loop by the first.",
             (
-                "calibrate hidden-effect/runs.csv --robot given.toml --max-predictions 1 --no-path --out fitted",
+                "calibrate hidden-effect/runs.csv --robot given.toml --max-predictions 2 --no-path --out fitted",
                 *_again("truth", "truth.toml"),
                 *_again("corrected", "hidden-effect/corrected.toml"),
                 *_again("fitted", "fitted/corrected.toml"),
