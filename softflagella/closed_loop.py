@@ -44,6 +44,7 @@ def calibrate(
     unit: LengthUnit | None = None,
     session: str | None = None,
     specimen: str | None = None,
+    trace: str | None = None,
     held_out: str | Sequence[str] | None = None,
     noise: Noise | None = None,
     notes: Sequence[str] | None = None,
@@ -55,7 +56,7 @@ def calibrate(
 ) -> RobotVerdict | ModelVerdict:
     """Fit a table of measured runs, find what the model lacks, and correct the robot, or a model of your own.
 
-    `protocol`, `laws`, `paths` and `unit` are for a robot; `session`, `specimen`, `held_out`, `noise` and
+    `protocol`, `laws`, `paths` and `unit` are for a robot; `session`, `specimen`, `trace`, `held_out`, `noise` and
     `notes` are for a model of your own.
 
     Args:
@@ -75,6 +76,8 @@ def calibrate(
             drawings with a size have their own.
         session: COL, the column that says which runs were made together (default: session, if there is one).
         specimen: COL, the column that says what was run, where there are several.
+        trace: COL, the column that says to which trace a reading belongs, where the model has a time. Without a
+            session each trace is one.
         held_out: NAME, a session that is held out for the test, or a column that says so of each run (default: the
             middle session).
         noise: say that neither repeats nor stated errors tell the noise of a run; nothing is claimed then. In
@@ -113,7 +116,7 @@ def calibrate(
     if not (isinstance(seed, Integral) and seed >= 0):
         raise InputError(f"seed: {seed}; give a whole number from 0")
     settings = own if isinstance(own, Mapping) else read_lab_settings(own or ())
-    roles = Roles(session, specimen, held_out, noise, notes)
+    roles = Roles(session, specimen, held_out, noise, notes, trace)
     if isinstance(robot, Model):
         _refuse("a model of your own", laws=not laws, paths=paths, unit=unit, protocol=protocol != "session")
         with limited(limit):

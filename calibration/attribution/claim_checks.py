@@ -29,6 +29,7 @@ from calibration.attribution.hypothesis import Hypothesis
 from calibration.attribution.rules import RULES, Trial, doubted
 from calibration.linear.gls import schur_complement
 from calibration.statistics.fit import Fit
+from calibration.statistics.residual_tests import kernel_factor
 from calibration.statistics.statistical_model import regression
 from calibration.statistics.study import Study, held_out_p_value
 from calibration.table.runs import Runs
@@ -66,8 +67,11 @@ def absorbable_shares(study: Study, fitted: Fit, names: Sequence[str]) -> Floats
     runs, used, noise = study.model.runs, study.split.fitted, fitted.noise
     claimed = [fitted.names.index(name) for name in names]
     order = [*(i for i in range(len(fitted.names)) if i not in claimed), *claimed]
-    factors = deformations(runs, used, _DRAWS, study.seed)
-    signals = np.concatenate([fitted.jacobian[used, :, p] * factors.T[..., None] for p in claimed])  # (B, n, k)
+    factors = np.ones((len(runs), _DRAWS))
+    factors[used] = deformations(runs, used, _DRAWS, study.seed)
+    plain = runs.raw(fitted.jacobian)
+    deformed = (runs.whitened(plain[..., [p]] * factors[:, None])[used] for p in claimed)
+    signals = np.moveaxis(np.concatenate(list(deformed), -1), -1, 0)  # (B, n', k)
     linear = regression(runs, used, fitted.jacobian[..., order], [fitted.fitted[i] for i in order])
     normal = linear.products(signals, noise.run_covariance).at(np.tile(noise.session_ratio, (len(signals), 1)))
     before = schur_complement(normal, len(order) - len(claimed))
@@ -82,15 +86,10 @@ def imitability(shares: Floats, strength: float) -> float:
 
 
 def deformations(runs: Runs, used: Flags, count: int, seed: int) -> Floats:
-    """Draw exp(g) at the runs in `used`, (n, count)."""
+    """Draw exp(g) at the runs in `used`, (n', count)."""
     spread = runs.inputs[used].std(0)
-    inputs = runs.inputs[used] / np.where(spread > 0, spread, 1.0)
-    kinds, place = np.unique(inputs.round(9), axis=0, return_inverse=True)
-    distance = ((kinds[:, None] - kinds[None]) ** 2).sum(-1)
-    values, vectors = np.linalg.eigh(np.exp(-distance / 2))
-    drawn = np.random.default_rng(seed).normal(size=(len(kinds), count))
-    g = vectors @ (np.sqrt(np.maximum(values, 0.0))[:, None] * drawn)
-    return np.asarray(np.exp(_SPREAD * g)[place.reshape(-1)])
+    factor = kernel_factor(runs.inputs[used] / np.where(spread > 0, spread, 1.0))
+    return np.asarray(np.exp(_SPREAD * factor @ np.random.default_rng(seed).normal(size=(factor.shape[1], count))))
 
 
 def transfer_p(study: Study, fitted: Fit) -> float:
@@ -99,8 +98,9 @@ def transfer_p(study: Study, fitted: Fit) -> float:
     It is 1 where runs are too few or too much alike.
     """
     runs, used, p = study.model.runs, study.split.fitted, []
-    for near in runs.nearer(used):
-        others = used & ~near
+    for nearer in runs.nearer(used):
+        others = runs.left_out(used & ~nearer)
+        near = used & ~others
         if others.any() and runs.values(near) >= _ENOUGH * len(fitted.names):
             refit = fitted.refitted(runs, near, for_test=True)
             p.append(held_out_p_value(refit, runs, others, seed=study.seed))

@@ -21,7 +21,7 @@ from scipy.special import stdtrit
 from calibration.linear.gls import Noise, solve_normal
 from calibration.statistics.fit import Fit
 from calibration.statistics.signed_ranks import signed_rank_p
-from calibration.statistics.study import Study, groups, leave_one_group_out
+from calibration.statistics.study import Study, leave_one_group_out
 from common.arrays import Floats, Integers
 
 _QUANTILE = 0.975
@@ -63,7 +63,7 @@ def gain_of_residuals(study: Study, before: Floats, after: Floats, b: float = 1.
     """Compare two left-out residuals, in the noise b S."""
     rows = left_out_rows(study)
     gains = ((before**2 - after**2) / (2 * b)).reshape(len(rows), -1).sum(1)
-    condition = np.unique(study.model.runs.condition[rows], return_inverse=True)[1].reshape(-1)
+    condition = np.unique(study.model.runs.resampled[rows], return_inverse=True)[1].reshape(-1)
     return PairedGain(np.asarray(np.bincount(condition, weights=gains), dtype=float))
 
 
@@ -84,16 +84,16 @@ def left_out_residuals(study: Study, base: Fit, refit: Fit) -> tuple[Floats, Flo
 def left_out_residual(study: Study, fitted: Fit, noise: Noise) -> Floats:
     """Whiten the residual of all fitted runs, in the order of `left_out_rows`, each from the other sessions."""
     data, parts = study.model.runs, []
-    for learn, out in leave_one_group_out(groups(data)[0], study.split.fitted):
+    for learn, out in leave_one_group_out(data, study.split.fitted):
         step = solve_normal(fitted.normal_of_fit(data, learn, noise))[0]
         predicted = (data.y - fitted.prediction)[out] - fitted.tangents[out] @ step
-        parts.append(noise.whitener(data.session[out], data.scale[out])(predicted))
+        parts.append(noise.whitener(data.session[out], data.scale[out], data.along[out])(predicted))
     return np.concatenate(parts)
 
 
 def left_out_rows(study: Study) -> Integers:
     """Return the places of the runs of a left-out residual."""
-    left_out = leave_one_group_out(groups(study.model.runs)[0], study.split.fitted)
+    left_out = leave_one_group_out(study.model.runs, study.split.fitted)
     return np.concatenate([np.flatnonzero(out) for _, out in left_out])
 
 

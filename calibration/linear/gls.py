@@ -27,6 +27,9 @@ weight that it has at ρ = 0. Where ρ is unknown, it is 0 in W. The covariance 
 where priors count in A and B alike; the second form is that of A⁻¹ for a column without any signal. With balanced
 sessions a fit loses nothing by it (McElroy 1967). The tests have Σ: a shift of all runs is no evidence.
 
+**Traces.** Readings of traces are whitened along their time first (`calibration.linear.memory`). So a shift of all
+readings of a session, 1, is L⁻¹1 in them. It takes the place of √w as that along which means are taken.
+
 **Weights.** A run of weight w has the covariance S/w (`calibration.statistics.weights`):
 
     Σ = W⁻¹ ⊗ S + 1 1ᵀ ⊗ A diag(ρ) Aᵀ,   W = diag w.
@@ -44,6 +47,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -53,6 +57,27 @@ UNKNOWN_RATIO = 1.0  # ρ where nothing is known about it
 _MOST_SCATTER = 9.0  # largest ρ
 _LEAST_FREEDOM = 0.5  # degrees of freedom of the sessions' means below which ρ is unknown
 _RIDGE = 1e-11  # so that columns without any signal get a large variance
+
+
+class Groups(NamedTuple):
+    """Runs in the order of their conditions."""
+
+    order: Integers  # (n,)
+    back: Integers  # (n,) place of each run in that order
+    first: Integers  # (c,) first run of each condition
+    sizes: Integers  # (c,)
+    place: Integers  # (n,) condition of each run in that order
+
+    @classmethod
+    def of(cls, condition: Integers) -> Groups:
+        """Sort runs by their conditions (n,)."""
+        order = np.argsort(condition, kind="stable")
+        first, count = np.unique(condition[order], return_index=True, return_counts=True)[1:]
+        return cls(order, np.argsort(order), first, count, np.repeat(np.arange(len(count)), count))
+
+    def add(self, table: Floats) -> Floats:
+        """Add up the runs of each condition, (..., n, k) to (..., c, k)."""
+        return np.asarray(np.add.reduceat(table, self.first, axis=-2))
 
 
 @dataclass(frozen=True)
@@ -67,14 +92,17 @@ class Noise:
         """Standard deviation of a run, root mean square over the outputs."""
         return float(np.sqrt(np.trace(self.run_covariance) / len(self.run_covariance)))
 
-    def whitener(self, session: Integers, scale: Floats | None = None) -> Callable[[Floats], Floats]:
-        """Make Σ^−½, (n, k, ...) to (n k, ...), for runs of `session` (n,); `scale` (n,): roots of weights."""
-        along = np.ones(len(session)) if scale is None else scale
-        root, (picks, sizes) = inverse_root(self.run_covariance), averaging_rows(session, along)
+    def whitener(
+        self, session: Integers, scale: Floats | None = None, along: Floats | None = None
+    ) -> Callable[[Floats], Floats]:
+        """Make Σ^−½, (n, k, ...) to (n k, ...), for runs of `session` (n,); see `Regression` for the others."""
+        scale = np.ones(len(session)) if scale is None else scale
+        root = inverse_root(self.run_covariance)
+        picks, sizes = averaging_rows(session, scale if along is None else along)
         less = 1 / np.sqrt(1 + sizes[:, None] * np.broadcast_to(self.session_ratio, len(root))) - 1  # (s, k)
 
         def whiten(table: Floats) -> Floats:
-            white = np.einsum("n,ab,nb...->na...", along, root, table, optimize=True)
+            white = np.einsum("n,ab,nb...->na...", scale, root, table, optimize=True)
             means = np.einsum("sa,sn,na...->sa...", less, picks, white, optimize=True)
             return np.asarray((white + np.tensordot(picks.T, means, 1)).reshape(-1, *table.shape[2:]))
 
@@ -103,6 +131,7 @@ class Regression:
         repeated: Integers | Floats | None = None,
         completion: Floats | None = None,
         declared: Floats | None = None,
+        along: Floats | None = None,
     ):
         """Multiply the columns with each other.
 
@@ -114,12 +143,14 @@ class Regression:
             repeated: what tells repeats, see `Runs.repeats`; needed for the residuals' own S.
             completion: (n, k, k) of runs with gaps, see `statistical_model`; acts on what is drawn.
             declared: S, (k, k), where it need not be estimated.
+            along: (n,) what a shift of all runs of a session is in each run, times `scale`; default: `scale`.
         """
         n, k, m = columns.shape
         self.precision, self.repeated, self.completion, self.declared = precision, repeated, completion, declared
         self.session = np.unique(session, return_inverse=True)[1].reshape(-1)
         self.scale = np.ones(n) if scale is None else scale
-        self.picks, self.sizes = averaging_rows(session, self.scale)
+        self.along = self.scale if along is None else along
+        self.picks, self.sizes = averaging_rows(session, self.along)
         self.columns = columns * self.scale[:, None, None]
         self._flat = self.columns.reshape(n * k, m)
         self.means = self.average(self.columns)  # (s, k, m)
@@ -186,7 +217,7 @@ class Regression:
         count, (n, k, _), p = len(session_ratio), self.columns.shape, len(self.precision)
         noise = rng.normal(size=(count, n, k)) / self.scale[:, None]
         shifts = rng.normal(size=(count, len(self.sizes), k))[:, self.session]
-        noise += np.sqrt(session_ratio)[:, None, :] * shifts
+        noise += np.sqrt(session_ratio)[:, None, :] * shifts * (self.along / self.scale)[:, None]
         if spread is None:
             known = self.precision > 0
             spread = np.diag(np.where(known, 1 / np.sqrt(np.where(known, self.precision, 1.0)), 0.0))
@@ -361,7 +392,7 @@ def averaging_rows(session: Integers, scale: Floats | None = None) -> tuple[Floa
     """Make rows (s, n) that take the mean of each session times the root of its size; the sizes (s,).
 
     Args:
-        scale: (n,) roots of the weights, by which the runs were multiplied; their squares are the sizes.
+        scale: (n,) what 1 became in each run, such as the roots of the weights; their squares are the sizes.
     """
     kinds, place = np.unique(session, return_inverse=True)
     along = np.ones(len(session)) if scale is None else scale

@@ -29,22 +29,24 @@ def check_function(model: FunctionModel, *, title: str = "") -> tuple[str, ...]:
             nothing, or an output is far from what was measured.
     """
     runs = model.runs
-    if runs.sigma is None and repeat_count(runs.repeat_ids) >= FEWEST_REPEATS:
+    if runs.trace is None and runs.sigma is None and repeat_count(runs.repeat_ids) >= FEWEST_REPEATS:
         refuse_equal_repeats(runs, runs.repeat_ids, runs.outputs)
     parameters, start = model.model.parameters, start_values(model)
+    as_declared = {p.name: p.start for p in parameters}
     count = len(model.coefficients)
     if len(runs) < _FEWEST or runs.values(np.ones(len(runs), dtype=bool)) <= count:
         least = max(_FEWEST, count + 1)
         raise InputError(
             f"{len(runs)} usable rows for {count} numbers to fit; give {least} rows, better many more"
         )
-    sets = [start, *({**start, p.name: _changed(p)} for p in parameters)]
+    sets = [start, *({**start, **model.everywhere(p.name, _changed(p))} for p in parameters)]
     given, *changed = model.returned(sets, title=title)
     _check_values(model, given, changed)
-    if not np.array_equal(given, evaluate(model.model, model.columns, start)):
+    call = model.calls[0]
+    if not np.array_equal(given[call.rows], evaluate(model.model, call.columns, as_declared)):
         raise InputError("the model's function gives other values when it is called again; let it draw no numbers")
     for parameter, prediction in zip(parameters, changed, strict=True):
-        fitted = parameter in (*model.coefficients, *model.nuisances)
+        fitted = parameter.name not in {effect.name for effect in model.effects}
         if fitted and not np.isfinite(prediction).all() and not _solved_near(model, parameter, start):
             raise InputError(
                 f"the model's function gives no finite numbers with {parameter.name} = {_changed(parameter):g}, "
@@ -57,7 +59,7 @@ def check_function(model: FunctionModel, *, title: str = "") -> tuple[str, ...]:
             )
     alike = _inseparable(model, {p.name: each - given for p, each in zip(parameters, changed, strict=True)})
     for number, second in alike:
-        if second in model.coefficients:
+        if second not in model.effects:
             raise InputError(
                 f"{number.name} and {second.name} cannot be told apart: they change the outputs in proportion, as "
                 "in a product; leave one of them out of numbers=[…], or give it a sigma"
@@ -79,8 +81,9 @@ def _inseparable(model: FunctionModel, changes: dict[str, Floats]) -> list[tuple
 
     They do so at the start and elsewhere; `changes` are those of larger steps, which tell what need not be tried.
     """
-    start, free = start_values(model), model.coefficients
-    points = start, {**start, **{p.name: _changed(p) for p in free}}
+    start, free = start_values(model), [n.parameter for n in model.model.numbers if n.sigma is None]
+    elsewhere = [model.everywhere(p.name, _changed(p)) for p in free]
+    points = start, {**start, **{name: value for changed in elsewhere for name, value in changed.items()}}
     return [
         (p, q)
         for p, q in (*combinations(free, 2), *product(free, model.effects))
@@ -91,7 +94,10 @@ def _inseparable(model: FunctionModel, changes: dict[str, Floats]) -> list[tuple
 
 def _slope_along(model: FunctionModel, at: dict[str, float], of: Parameter) -> Floats:
     """Return how the prediction changes with a small change of a parameter to either side."""
-    up, down = model.predict([{**at, of.name: of.moved(at[of.name], by * of.typical)} for by in (_SMALL, -_SMALL)])
+    names = model.everywhere(of.name, of.start)
+    up, down = model.predict(
+        [{**at, **{n: of.moved(at[n], by * of.typical) for n in names}} for by in (_SMALL, -_SMALL)]
+    )
     return np.asarray(up - down)
 
 
@@ -103,7 +109,7 @@ def _in_proportion(one: Floats, other: Floats, within: float = 1e-5) -> bool:
 def _solved_near(model: FunctionModel, parameter: Parameter, start: dict[str, float]) -> bool:
     """Say whether the function gives finite numbers a little above the start of a parameter, or below it."""
     near = [
-        {**start, parameter.name: parameter.moved(parameter.start, by * parameter.typical)}
+        {**start, **model.everywhere(parameter.name, parameter.moved(parameter.start, by * parameter.typical))}
         for by in (-_NEXT, _NEXT)
     ]
     return bool(np.isfinite(model.predict(near)).all((1, 2)).any())

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import Any, Literal, get_args
 
 from calibration.statistics.checks import names_once
 from calibration.statistics.statistical_model import Parameter
@@ -14,6 +14,7 @@ from calibration.table.declared import Declared, Output, refuse_no_deviation
 from common.errors import InputError
 from common.units import find_unit, parse_sigma, split
 
+Group = Literal["trace", "session", "specimen"]
 Function = Callable[[Mapping[str, Any], Mapping[str, float]], Mapping[str, Any]]  # columns, parameters -> outputs
 _WIDE = 1000.0  # factor to the ends of the range of a number for which none is given
 
@@ -36,9 +37,12 @@ class Number(Declared):
     high: float | None = None  # largest value; default: a thousand times the start
     title: str | None = None  # in words; default: the name
     sigma: float | str | None = None  # of a number known to a tolerance: in its unit, or "1 %" of the start
+    per: Group | None = None  # what has a number of its own, such as the start of each trace; None: all share it
 
     def __post_init__(self) -> None:
         self._tidy(self.name)
+        if self.per not in (None, *get_args(Group)):
+            raise InputError(f"{self.name}: per {self.per!r}; give one of {', '.join(get_args(Group))}")
         bounds = self._bounds
         _refuse_outside(self.name, "start", self.start, bounds)
         if (sigma := self._deviation) is None:
@@ -72,6 +76,16 @@ class Number(Declared):
         return Parameter(
             self.name, self.title or self.name, self.start, (low, high), typical,
             logarithmic=low > 0, unit=self.unit, sigma=sigma,
+        )  # fmt: skip
+
+    def of_groups(self, names: Sequence[str]) -> tuple[Parameter, ...]:
+        """Return the number that each group has of its own."""
+        shared = self.parameter
+        own = (f" of {name}" for name in names)
+        return tuple(
+            replace(shared, name=self.name + of, title=shared.title + of, of_these_runs=self.per != "specimen",
+                    of_group=(self.name, name))
+            for of, name in zip(own, names, strict=True)
         )  # fmt: skip
 
 
@@ -118,7 +132,8 @@ class Model:
     """A model of one's own, to be calibrated with a table of runs.
 
     The function gets the columns for which it asks, arrays (n,), and one value for each parameter. It returns an
-    array (n,) for each output.
+    array (n,) for each output. With `time` it gets the readings of one trace, sorted in time, so that it may
+    integrate an equation; with numbers that sessions or specimens have of their own, the runs of one of these.
 
     Example:
         >>> import softflagella as sf
@@ -142,6 +157,7 @@ class Model:
     settings: Sequence[str] | None = None  # columns that repeats share; default: all for which the function asks
     # In which the function asks for columns, {"length": "m"}; the table may have length_cm.
     units: Mapping[str, str] = field(default_factory=dict)
+    time: str | None = None  # column with the times of readings; the table is one of traces
 
     def __post_init__(self) -> None:
         for name, unit in self.units.items():
@@ -155,6 +171,8 @@ class Model:
                 raise InputError(
                     f"{what} of a model are each an sf.{kind.__name__}, one at least; given: {given!r}"
                 )
+        if self.time is None and any(number.per == "trace" for number in self.numbers):
+            raise InputError("a number per trace needs the column of the time: sf.Model(…, time=\"t_s\")")
         names_once(parameter.name for parameter in self.parameters)
 
     def without(self, *names: str) -> Model:

@@ -1,11 +1,17 @@
-"""A function of one's own as a model of the calibration. It never sees an array in place of a parameter."""
+"""A function of one's own as a model of the calibration. It never sees an array in place of a parameter.
+
+It is called once for all runs; or once for each trace, or for runs that have the same numbers of their own. What a
+call returned is kept. So a change of a number of one trace costs the call of that trace.
+"""
 
 from __future__ import annotations
 
 import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import cached_property
+from itertools import chain
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -65,6 +71,14 @@ class TableRuns(Runs):
         }
 
 
+class Call(NamedTuple):
+    """Runs for which the function is called together."""
+
+    rows: Integers  # (n',)
+    columns: AskedColumns  # of these
+    own: Mapping[str, str]  # number that they have of their own -> its name among the parameters
+
+
 @dataclass(frozen=True)
 class FunctionModel:
     """A model of one's own with its runs: an `Experiment`."""
@@ -75,20 +89,48 @@ class FunctionModel:
     untestable: Mapping[str, str] = field(default_factory=dict)
     about: Floats | None = None  # (n, k) within half a turn of which angles are predicted; None: the measured ones
     own: Mapping[str, Sequence[float]] = field(default_factory=dict)  # settings that the lab can set, by column
-    known: dict[tuple[float, ...], Floats] = field(default_factory=dict)  # parameters -> (n, k), the latest
+    known: dict[tuple[float, ...], Floats] = field(default_factory=dict)  # call, parameters -> (n', k), the latest
     unsolved: dict[str, None] = field(default_factory=dict)  # parameters with values that are not finite, in words
 
-    @property
+    @cached_property
     def coefficients(self) -> tuple[Parameter, ...]:
-        return tuple(number.parameter for number in self.model.numbers if number.sigma is None)
+        return self._numbers(known=False)
 
-    @property
+    @cached_property
     def nuisances(self) -> tuple[Parameter, ...]:
-        return tuple(number.parameter for number in self.model.numbers if number.sigma is not None)
+        return self._numbers(known=True)
 
-    @property
+    @cached_property
     def effects(self) -> tuple[Parameter, ...]:
         return tuple(effect.parameter for effect in self.model.effects)
+
+    def _numbers(self, *, known: bool) -> tuple[Parameter, ...]:
+        """List the numbers with a prior, or those without; what groups have of their own behind the others."""
+        numbers = [number for number in self.model.numbers if (number.sigma is not None) == known]
+        shared = [number.parameter for number in numbers if number.per is None]
+        own = [number.of_groups(self.runs.groups(number.per)[1]) for number in numbers if number.per is not None]
+        return (*shared, *chain.from_iterable(own))
+
+    def everywhere(self, name: str, value: float) -> dict[str, float]:
+        """Give one value to a parameter, or to all that groups have of it."""
+        own = [of.name for of in (*self.coefficients, *self.nuisances) if of.of_group and of.of_group[0] == name]
+        return dict.fromkeys(own or [name], value)
+
+    @cached_property
+    def calls(self) -> tuple[Call, ...]:
+        """The runs of each call: all, or those of a trace, that have the same numbers of their own."""
+        per = {number.name: number.per for number in self.model.numbers if number.per is not None}
+        kinds = {kind: self.runs.groups(kind) for kind in {*per.values(), *(["trace"] if self.model.time else [])}}
+        if not kinds:
+            return (Call(np.arange(len(self.runs)), self.columns, {}),)
+        each = np.stack([number for number, _ in kinds.values()], 1)
+        calls = []
+        for which in np.unique(each, axis=0).tolist():
+            rows = np.flatnonzero((each == which).all(1))
+            names = {kind: known[at] for at, (kind, (_, known)) in zip(which, kinds.items(), strict=True)}
+            own = {name: f"{name} of {names[kind]}" for name, kind in per.items()}
+            calls.append(Call(rows, self.columns.rows(rows), own))
+        return tuple(calls)
 
     def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
         """Predict (P, n, k), see `ForwardModel`; angles within half a turn of what was measured."""
@@ -107,26 +149,38 @@ class FunctionModel:
         return np.array([output.turn for output in self.model.outputs.values()])
 
     def _predict(self, parameters: Parameters) -> Floats:
-        """Call the function, once for each distinct combination of values where some differ between runs."""
-        values = {p.name: parameters.get(p.name, p.start) for p in self.model.parameters}
-        differing = [name for name, value in values.items() if np.ndim(value)]
+        """Predict (n, k) by all calls."""
+        prediction = np.full(self.runs.y.shape, np.nan)
+        for place, call in enumerate(self.calls):
+            if place and spent():  # as if it were not solved, so that many calls end within one
+                break
+            given = {p.name: parameters.get(call.own.get(p.name, p.name), p.start) for p in self.model.parameters}
+            prediction[call.rows] = self._called(place, call, given)
+        return prediction
+
+    def _called(self, place: int, call: Call, values: Mapping[str, Any]) -> Floats:
+        """Predict the runs of a call (n', k): by one, or by one for each combination of values that differ in it."""
+        of_call = {name: value[call.rows] if np.ndim(value) else value for name, value in values.items()}
+        arrays = [name for name, value in of_call.items() if np.ndim(value)]
+        differing = [name for name in arrays if (of_call[name] != of_call[name][0]).any()]
+        plain = {**of_call, **{name: of_call[name][0].item() for name in arrays}}
         if not differing:
-            key = tuple(values.values())
+            key = (place, *plain.values())
             if key not in self.known:
-                self.known[key] = self._noted(evaluate(self.model, self.columns, values), values)
+                self.known[key] = self._noted(evaluate(self.model, call.columns, plain), plain)
             found = self.known[key] = self.known.pop(key)  # the last of them
-            while len(self.known) > _KEPT:
+            while len(self.known) > _KEPT * len(self.calls):
                 del self.known[next(iter(self.known))]
             return found
-        every = np.stack([values[name] for name in differing], 1)
+        every = np.stack([of_call[name] for name in differing], 1)
         kinds, kind = np.unique(every, axis=0, return_inverse=True)
-        prediction = np.full(self.runs.y.shape, np.nan)
-        for place, combination in enumerate(kinds.tolist()):
-            if spent():  # as if it were not solved, so that many calls end within one
+        prediction = np.full((len(call.rows), self.runs.y.shape[1]), np.nan)
+        for number, combination in enumerate(kinds.tolist()):
+            if spent():
                 break
-            rows = kind.reshape(-1) == place
-            one = values | dict(zip(differing, combination, strict=True))
-            prediction[rows] = self._noted(evaluate(self.model, self.columns.rows(rows), one), one)
+            rows = kind.reshape(-1) == number
+            one = plain | dict(zip(differing, combination, strict=True))
+            prediction[rows] = self._noted(evaluate(self.model, call.columns.rows(rows), one), one)
         return prediction
 
     def _noted(self, prediction: Floats, values: Mapping[str, Any]) -> Floats:
@@ -168,7 +222,8 @@ class FunctionModel:
             table = table.drop(columns=name).merge(pd.Series(own, name=name, dtype=float), how="cross")
         table = table.drop_duplicates(names := [name.removeprefix("ln ") for name in self.runs.input_names])
         runs = self.runs.subset(table.pop("row").to_numpy())
-        runs = replace(runs, session=np.zeros(len(runs), dtype=np.int64), session_names=("next",))
+        if not any(number.per == "session" for number in self.model.numbers):
+            runs = replace(runs, session=np.zeros(len(runs), dtype=np.int64), session_names=("next",))
         values = {name: table[name].to_numpy().astype(old.dtype) for name, old in self.columns.items()}
         settings = [{name: values[name][row].item() for name in names} for row in range(len(runs))]
         return replace(self, runs=runs, columns=AskedColumns(values, self.columns.asked), known={}), settings

@@ -6,6 +6,7 @@ counts with the others. Columns that nobody asks for are notes, unless an output
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -21,7 +22,7 @@ from calibration.own_model.declared import Model
 from calibration.own_model.function_model import AskedColumns, FunctionModel, TableRuns, evaluate
 from calibration.statistics.study import middle_session
 from calibration.table.excluded import MANY
-from calibration.table.reader import Declaration, TableReader, as_numbers, is_missing, open_table, require
+from calibration.table.reader import FEWEST_READINGS, Declaration, TableReader, as_numbers, is_missing, open_table, require
 from calibration.table.runs import FEWEST_REPEATS
 from common.arrays import Flags, Floats, Integers, Words
 from common.errors import InputError, naming
@@ -33,6 +34,7 @@ Noise = Mapping[str, float | str] | Literal["unknown"]
 _FOLLOWS = 0.98  # correlation of ranks among repeats with an output that was computed from a column
 _SESSION = re.compile("session|day|date|round|series|batch|trial|repeat|lot")  # in names of columns
 _MOST = 200_000_000  # rows times settings
+_HEAD = 0.2  # share of the runs of a group to which its own numbers are fitted where it is left out
 _TRUE = ("true", "yes", "1", "1.0")
 
 
@@ -44,6 +46,7 @@ class Roles(NamedTuple):
     held_out: str | Sequence[str] | None = None
     noise: Noise | None = None
     notes: Sequence[str] | None = None
+    trace: str | None = None
 
 
 def read_runs_of(
@@ -61,7 +64,9 @@ def read_runs_of(
     """
     with naming(source):
         table = open_table(source)
-        session = roles.session or ("session" if "session" in table else None)
+        session = roles.session or ("session" if "session" in table else roles.trace)
+        if (roles.trace is None) != (model.time is None):
+            raise InputError("a table of traces needs the column of their names, trace=, and a model with time=")
         result = _read(table, model, roles._replace(session=session))
         caveats = check_function(result, title=title)
         held_out = _held_out(roles.held_out, result)
@@ -92,18 +97,28 @@ def _in_its_units(table: pd.DataFrame, model: Model) -> tuple[pd.DataFrame, tupl
 def _read(original: pd.DataFrame, model: Model, roles: Roles) -> FunctionModel:
     table, converted = _in_its_units(original, model)
     require(table, _names(roles.notes))
-    own = [name for name in (roles.specimen, roles.session) if name]
+    own = [name for name in (roles.specimen, roles.session, roles.trace, model.time) if name]
+    for number in model.numbers:
+        if number.per and not getattr(roles, number.per):
+            raise InputError(f"{number.name} is a number per {number.per}: name its column, {number.per}=")
     same = {name: (name, 1.0) for name in model.outputs}
     required = [*(model.settings or ()), *own]
-    declared = Declaration(model.outputs, same, required, roles.session, roles.specimen)
+    kinds = {model.time: float} if model.time else {}
+    declared = Declaration(
+        model.outputs, same, required, roles.session, roles.specimen, roles.trace, model.time, kinds
+    )
     reader = TableReader(table, declared, original)
     _set_aside_low(reader)
+    if model.time:  # a reading that lacks an output is a gap in its trace
+        for name in model.outputs:
+            reader.set_aside_not_finite(name, ~np.isfinite(reader.measured[name]))
     columns = AskedColumns(reader.columns)
     settings = _settings(model, columns, reader)
     needed = [*columns.asked, *settings, *own]
     reader.set_aside_lacking(needed)
-    known = reader.runs([name for name in (roles.specimen, *settings) if name])
-    if (count := len(known["rows"])) * (distinct := int(known["condition"].max()) + 1) > _MOST:
+    known = _by_trace(reader.runs([name for name in (roles.specimen, *settings) if name]))
+    count, distinct = len(known["rows"]), int(known["condition"].max()) + 1
+    if model.time is None and count * distinct > _MOST:
         raise InputError(
             f"{distinct} settings in {count} rows are more than can be tested; name what repeats share in "
             "settings=[…] of the model, round it, or give fewer rows"
@@ -115,19 +130,41 @@ def _read(original: pd.DataFrame, model: Model, roles: Roles) -> FunctionModel:
         values = as_numbers(columns[name])
         logarithmic = columns[name].dtype.kind == "f" and bool((values > 0).all())
         inputs[f"ln {name}" if logarithmic else name] = np.log(values) if logarithmic else values
+    if model.time:
+        inputs[model.time] = known["time"]
     runs = TableRuns(
         **known,
         inputs=np.column_stack(list(inputs.values())),
         input_names=tuple(inputs),
+        heads=_heads(model, known),
         caveats=(),
         sigma=_sigma(model, roles.noise),
         noise_known=roles.noise != "unknown",
-        notes=_notes(columns, [*needed, *_names(roles.held_out)], roles.notes, good, known["condition"]),
+        notes={} if model.time else _notes(columns, [*needed, *_names(roles.held_out)], roles.notes, good, known["condition"]),
         unit_checked={name: output.unit_checked for name, output in model.outputs.items()},
         words=frozenset(name for name in settings if columns[name].dtype.kind != "f"),
         converted=converted,
     )
     return FunctionModel(model, runs.with_outputs(range(len(runs.outputs))), columns)
+
+
+def _by_trace(known: dict[str, Any]) -> dict[str, Any]:
+    """Sort fields of runs by trace, then by time."""
+    if "trace" not in known:
+        return known
+    order = np.lexsort((known["time"], known["trace"]))
+    return {name: field[order] if isinstance(field, np.ndarray) else field for name, field in known.items()}
+
+
+def _heads(model: Model, known: Mapping[str, Any]) -> Flags | None:
+    """Say which runs are the first of those that have numbers of their own, (n,); None without such numbers."""
+    groups = [known[number.per] for number in model.numbers if number.per]
+    heads = np.zeros(len(known["rows"]), dtype=bool)
+    for group in groups:
+        for kind in np.unique(group):
+            rows = np.flatnonzero(group == kind)
+            heads[rows[: max(FEWEST_READINGS, math.ceil(_HEAD * len(rows)))]] = True
+    return heads if groups else None
 
 
 def _advice(model: FunctionModel, roles: Roles) -> list[str]:
@@ -168,13 +205,16 @@ def _settings(model: Model, columns: AskedColumns, reader: TableReader) -> list[
     while before < (before := len(columns.asked)):
         reader.set_aside_lacking(columns.asked)
         usable = reader.usable
+        if model.time:
+            usable = usable & reader.of_first_trace
         try:
             evaluate(model, columns.rows(usable), {p.name: p.start for p in model.parameters})
         except InputError:
             if len(columns.asked) == before:  # otherwise it may be due to what is missing
                 raise
-    if model.settings or columns.asked:
-        return list(model.settings or columns.asked)
+    settings = [name for name in model.settings or columns.asked if name != model.time]
+    if settings or model.time:
+        return settings
     raise InputError("the function asks for no column; name the model's settings, columns that repeats share")
 
 

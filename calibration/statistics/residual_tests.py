@@ -39,8 +39,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.linear.gls import (
+    Groups,
     NormalEquations,
-    averaging_rows,
     inverse_root,
     schur_complement,
     solve_normal,
@@ -59,7 +59,8 @@ _PASSES = 3  # iterations for the scatter of the sessions
 _PASSES_OF_A_SCORE = 2
 _AT_ONCE = 50  # draws
 _FEWEST_DRAWS = 100  # where no time is left
-_MOST_PLACES = 1000  # distinct inputs between which a kernel is computed
+_MOST_PLACES, _LANDMARKS = 1000, 200  # distinct inputs between which a kernel is computed, and those of more
+_SEEN = 1e-2  # share of the largest eigenvalue of the kernel between these that counts
 _VALUES = 2_000_000  # of the draws that are made at once
 
 
@@ -164,12 +165,12 @@ class _Tester:
         self.J, scale = self.design.columns[..., : self.p], self.design.scale
         inputs = data.inputs[used]
         spread = inputs.std(0)
-        inputs = (inputs - inputs.mean(0)) / np.where(spread > 0, spread, 1.0)
-        self.places, self.K = _kernel(inputs)
-        self.places = self.places * scale
+        inputs = (data.inputs - inputs.mean(0)) / np.where(spread > 0, spread, 1.0)
+        self.smooth = data.whitened(kernel_factor(inputs))[used] * scale[:, None]  # (n', r)
         self.names, self.F = features(data, used)
-        self.F = self.F[used] * scale[:, None]
-        self.means = averaging_rows(data.condition[used], scale)[0]  # (c, n)
+        self.F = data.whitened(self.F)[used] * scale[:, None]
+        self.conditions = Groups.of(data.condition[used])
+        self.condition_sizes = self.conditions.add(scale[:, None] ** 2)  # (c, 1)
         self.F_means = self.design.average(self.F)  # (s, f)
         self.FJ = np.einsum("nf,nkp->fkp", self.F, self.J, optimize=True)
         self.FJ_means = np.einsum("sf,skp->sfkp", self.F_means, self.design.means[..., : self.p])
@@ -190,9 +191,9 @@ class _Tester:
         )
         white = residual * self.design.scale[:, None] - np.einsum("nkp,bp->bnk", self.J, step, optimize=True)
         white = self.design.shrink(white @ np.swapaxes(root, -1, -2), session_ratio)
-        lack = ((self.means @ white) ** 2).sum((-1, -2))
-        at_places = self.places @ white
-        kernel = np.einsum("bik,ij,bjk->b", at_places, self.K, at_places, optimize=True)
+        sums = self.conditions.add(white * self.design.scale[:, None])
+        lack = (sums**2 / self.condition_sizes).sum((-1, -2))
+        kernel = ((self.smooth.T @ white) ** 2).sum((-1, -2))
         shapes = self._shapes(covariance, white, root, session_ratio)
         largest = np.abs(shapes).max((-1, -2)) if shapes.size else np.zeros(len(session_ratio))
         pull = self._largest_pull(step, covariance)
@@ -222,17 +223,24 @@ class _Tester:
         return np.asarray(z).reshape(count, k, -1)
 
 
-def _kernel(inputs: Floats) -> tuple[Floats, Floats]:
-    """Return rows (u, n) that add up the runs with equal inputs (n, q), and the kernel (u, u) between these."""
-    kinds, place = np.unique(inputs, axis=0, return_inverse=True)
-    if len(kinds) > _MOST_PLACES:  # some of the places, evenly chosen, are enough
-        chosen = np.linspace(0, len(kinds) - 1, _MOST_PLACES).astype(int)
-        number = np.full(len(kinds), -1)
-        number[chosen] = np.arange(_MOST_PLACES)
-        kinds, place = kinds[chosen], number[place.reshape(-1)]
-    square = (kinds**2).sum(1)
-    distance = np.maximum(square[:, None] + square - 2 * kinds @ kinds.T, 0.0)
-    return (np.arange(len(kinds))[:, None] == place.reshape(-1)).astype(float), np.exp(-distance / 2)
+def kernel_factor(inputs: Floats) -> Floats:
+    """Return a factor (n, r) of the kernel exp(−|x − x′|²/2) of inputs (n, q).
+
+    Of many distinct inputs it is an approximation by some of them (Nyström 1930).
+    """
+    kinds, place = np.unique(inputs.round(9), axis=0, return_inverse=True)
+    several = len(kinds) > _MOST_PLACES
+    landmarks = kinds[np.linspace(0, len(kinds) - 1, _LANDMARKS).astype(int)] if several else kinds
+    values, vectors = np.linalg.eigh(_kernel(landmarks, landmarks))
+    if not several:
+        return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0)))[place.reshape(-1)])
+    seen = values > _SEEN * values[-1]
+    return np.asarray((_kernel(kinds, landmarks) @ (vectors[:, seen] / np.sqrt(values[seen])))[place.reshape(-1)])
+
+
+def _kernel(one: Floats, other: Floats) -> Floats:
+    distance = (one**2).sum(1)[:, None] + (other**2).sum(1) - 2 * one @ other.T
+    return np.asarray(np.exp(-np.maximum(distance, 0.0) / 2))
 
 
 def projected_scores(products: NormalEquations, p: int) -> tuple[Floats, Floats, Floats]:

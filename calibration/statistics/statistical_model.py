@@ -50,6 +50,7 @@ class Parameter:
     # from which it is fitted.
     grid: tuple[float, ...] = ()
     of_these_runs: bool = False  # no run that is made next has it
+    of_group: tuple[str, str] | None = None  # the number, and the group that has one of its own
 
     def changed(self, value: Any, by: Any) -> Any:
         """Change a value by `by`, on the parameter's own scale."""
@@ -178,9 +179,8 @@ def _every(model: ForwardModel) -> tuple[Parameter, ...]:
 def with_runs(model: Model, **changes: Any) -> Model:
     """Return the same model with something else in its runs."""
     changed, inner = copy.copy(model), getattr(model, "inner", None)
-    new = {"inner": with_runs(inner, **changes)} if inner else {"runs": replace(model.runs, **changes)}
-    for name, value in new.items():
-        object.__setattr__(changed, name, value)
+    name, new = ("inner", with_runs(inner, **changes)) if inner else ("runs", replace(model.runs, **changes))
+    object.__setattr__(changed, name, new)
     return changed
 
 
@@ -209,7 +209,7 @@ def regression(
 ) -> Regression:
     """Regress the runs in `rows` (n,) on columns (n, k, m) of all runs, the first those of `fitted`."""
     completion = None if runs.completion is None else runs.completion[rows]
-    declared = None if runs.sigma is None else np.diag(runs.sigma**2)
     return Regression(
-        columns[rows], precisions(fitted), runs.session[rows], runs.scale[rows], repeated, completion, declared
-    )
+        columns[rows], precisions(fitted), runs.session[rows], runs.scale[rows], repeated, completion,
+        runs.known_covariance, runs.along[rows],
+    )  # fmt: skip

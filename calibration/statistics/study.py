@@ -109,7 +109,7 @@ def groups(data: Runs) -> tuple[Integers, tuple[str, ...]]:
     rng = np.random.default_rng(0)
     for session in range(count):
         members = data.session == session
-        condition = np.unique(data.condition[members], return_inverse=True)[1].reshape(-1)
+        condition = np.unique(data.together[members], return_inverse=True)[1].reshape(-1)
         block[members] = session * parts + rng.permutation(condition.max() + 1)[condition] % parts
     names = (f"{name}, block {i + 1} of its conditions" for name in data.session_names for i in range(parts))
     return block, tuple(names)
@@ -149,13 +149,16 @@ def split_runs(data: Runs, held_out: Flags | None, outliers: tuple[Flags, tuple[
         caveats = (caveat,)
     bad, excluded = outliers
     held_out_names = ", ".join(names[g] for g in np.unique(group[held_out]))
-    return Split(~held_out & ~bad, held_out & ~bad, ~bad, held_out_names, excluded, caveats)
+    test = data.left_out(held_out) & ~bad
+    return Split(~test & ~bad, test, ~bad, held_out_names, excluded, caveats)
 
 
-def leave_one_group_out(group: Integers, used: Flags) -> Iterator[tuple[Flags, Flags]]:
+def leave_one_group_out(data: Runs, used: Flags) -> Iterator[tuple[Flags, Flags]]:
     """Yield the runs (n,) to learn from and the runs (n,) left out, for every group among those in `used`."""
+    group = groups(data)[0]
     for label in np.unique(group[used]):
-        yield used & (group != label), used & (group == label)
+        if (out := data.left_out(used & (group == label))).any():
+            yield used & ~out, out
 
 
 def divided(data: Runs, held_out: Flags) -> bool:
@@ -166,6 +169,8 @@ def divided(data: Runs, held_out: Flags) -> bool:
 def find_outliers(data: Runs, prediction: Floats) -> tuple[Flags, tuple[Excluded, ...]]:
     """Find the runs (n,) to exclude, and say why; `prediction` (n, k) of the model as given."""
     bad = np.zeros(len(data.y), dtype=bool)
+    if data.trace is not None:  # repeats may differ by numbers of their own
+        return bad, ()
     residual = data.y - prediction
     y, checked = data.y.copy(), [data.unit_checked.get(name, False) for name in data.outputs]
     for rows in (data.session == session for session in np.unique(data.session)):
@@ -250,7 +255,7 @@ def gain_interval(data: Runs, before: Floats, after: Floats, rows: Flags, seed: 
 
 def _drawn_errors(data: Runs, prediction: Floats, rows: Flags, seed: int) -> Floats:
     """Draw conditions, and compute the relative rms of each draw, (D,)."""
-    square, condition = np.nanmean(_scaled_square(data, prediction, rows), 1), data.condition[rows]
+    square, condition = np.nanmean(_scaled_square(data, prediction, rows), 1), data.resampled[rows]
     means = np.array([square[condition == c].mean() for c in np.unique(condition)])
     drawn = np.random.default_rng(seed).integers(0, len(means), (_DRAWS, len(means)))
     return np.asarray(np.sqrt(means[drawn].mean(1)))
@@ -270,22 +275,26 @@ def quarter_of_conditions(data: Runs, used: Flags) -> tuple[Flags, str]:
     rng, none = np.random.default_rng(0), np.zeros_like(used)
     if data.specimen is not None and len(kinds := np.unique(data.specimen[used])) >= _FEWEST_OF_A_QUARTER:
         chosen = rng.permutation(kinds)[: len(kinds) // 4]
-        return used & np.isin(data.specimen, chosen), "a quarter of the specimens"
-    kinds, first = np.unique(data.condition[used], return_index=True)
+        return data.left_out(used & np.isin(data.specimen, chosen)), "a quarter of the specimens"
+    condition, inputs, what = data.condition, data.inputs, "conditions"
+    if data.trace is not None:  # whole traces
+        inputs, what = data.partners, "traces"
+        condition = np.unique(inputs.round(9), axis=0, return_inverse=True)[1].reshape(-1)
+    kinds, first = np.unique(condition[used], return_index=True)
     if len(kinds) < _FEWEST_OF_A_QUARTER:
         return none, ""
-    inputs = data.inputs[used][first]
+    inputs = inputs[used][first]
     spread = inputs.std(0)
     distance = (((inputs - inputs.mean(0)) / np.where(spread > 0, spread, 1.0)) ** 2).sum(1)
     by_distance = kinds[np.argsort(-distance, kind="stable")]
     ends = max(len(kinds) // 8, 1)
     drawn = rng.permutation(by_distance[ends:])[: len(kinds) // 4 - ends]
-    return used & np.isin(data.condition, [*by_distance[:ends], *drawn]), "a quarter of the conditions"
+    return data.left_out(used & np.isin(condition, [*by_distance[:ends], *drawn])), f"a quarter of the {what}"
 
 
 def _scaled_square(data: Runs, prediction: Floats, rows: Flags) -> Floats:
     """Compute w r² of the runs in `rows`, (n', k); NaN for what was not measured."""
-    square = ((data.y - prediction) * data.scale[:, None]) ** 2
+    square = (data.raw(data.y - prediction) * data.scale[:, None]) ** 2
     return np.where(data.gaps, np.nan, square)[rows]
 
 

@@ -31,7 +31,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from calibration.linear.gls import Noise, inverse_root
+from calibration.linear.gls import Groups, Noise, inverse_root
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.statistical_model import with_runs
 from calibration.statistics.study import Study
@@ -69,7 +69,7 @@ class ContaminatedNormal:
 
     def weights(self, residual: Floats, condition: Integers) -> Floats:
         """Compute the weights (..., n) of runs with residuals (..., n, k) from a model."""
-        groups = _Groups.of(condition)
+        groups = Groups.of(condition)
         axes, lack = _axes(self.run, self.lack)
         white = residual[..., groups.order, :] @ axes.T
         weights = np.ones(white.shape[:-1])
@@ -80,26 +80,6 @@ class ContaminatedNormal:
             if moved < _SETTLED:
                 break
         return np.asarray(weights[..., groups.back])
-
-
-class _Groups(NamedTuple):
-    """Runs in the order of their conditions."""
-
-    order: Integers  # (n,)
-    back: Integers  # (n,) place of each run in that order
-    first: Integers  # (c,) first run of each condition
-    sizes: Integers  # (c,)
-    place: Integers  # (n,) condition of each run in that order
-
-    @classmethod
-    def of(cls, condition: Integers) -> _Groups:
-        order = np.argsort(condition, kind="stable")
-        first, count = np.unique(condition[order], return_index=True, return_counts=True)[1:]
-        return cls(order, np.argsort(order), first, count, np.repeat(np.arange(len(count)), count))
-
-    def add(self, table: Floats) -> Floats:
-        """Add up the runs of each condition, (..., n, k) to (..., c, k)."""
-        return np.asarray(np.add.reduceat(table, self.first, axis=-2))
 
 
 class _Expected(NamedTuple):
@@ -121,7 +101,7 @@ def _axes(run: Floats, lack: Floats) -> tuple[Floats, Floats]:
 
 
 def _expect(
-    white: Floats, weights: Floats, groups: _Groups, lack: Floats, share: float, ratio: float
+    white: Floats, weights: Floats, groups: Groups, lack: Floats, share: float, ratio: float
 ) -> _Expected:
     """Compute the departures of the conditions from the weights of the runs, and then these weights."""
     variance = 1 / (groups.add(weights[..., None]) + 1 / lack)
@@ -139,7 +119,7 @@ def _expect(
 
 def estimate(residual: Floats, condition: Integers) -> ContaminatedNormal | None:
     """Estimate the noise from residuals (n, k) of a model; None where one normal distribution does as well."""
-    groups = _Groups.of(condition)
+    groups = Groups.of(condition)
     rows = residual[groups.order]
     repeated = groups.sizes > 1
     if len(rows) - len(groups.sizes) < FEWEST_REPEATS:
@@ -156,7 +136,7 @@ def estimate(residual: Floats, condition: Integers) -> ContaminatedNormal | None
 
 
 def _maximise(
-    rows: Floats, groups: _Groups, scatter: Floats, ratio: float | None
+    rows: Floats, groups: Groups, scatter: Floats, ratio: float | None
 ) -> tuple[ContaminatedNormal, float]:
     """Estimate S, B and π (0 without a ratio c²) from residuals (n, k), with the bound of the log likelihood."""
     n = len(rows)
@@ -197,7 +177,7 @@ def fit_weighted(study: Study, start: Mapping[str, float]) -> tuple[Study, Fit]:
     names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
     title = "fit" if study.progress else ""
     fitted = fit(model, start, names, used, title=title)
-    for _ in range(_ROUNDS if model.runs.sigma is None else 0):
+    for _ in range(_ROUNDS if model.runs.known_covariance is None else 0):
         residual, condition = model.runs.y - fitted.prediction, model.runs.condition
         noise = estimate(residual[used], condition[used])
         if noise is None:

@@ -32,9 +32,14 @@ class Declaration(NamedTuple):
     needed: Sequence[str]  # columns of which every row has a value
     session: str | None  # column that says which runs were made together
     specimen: str | None  # column that says what was run
+    trace: str | None = None  # column that says to which trace a reading belongs
+    time: str | None = None  # column of its time
     kinds: Mapping[str, type] = {}  # column -> float or str; others are what most of their values are
     largest: float = math.inf  # of a value
     fewest: int = 1  # rows
+
+
+FEWEST_READINGS = 3  # of a trace
 
 
 def open_table(source: str | Path | pd.DataFrame) -> pd.DataFrame:
@@ -137,10 +142,14 @@ class TableReader:
 
     def runs(self, shared: Sequence[str]) -> dict[str, Any]:
         """Make fields of `Runs` of the usable rows that are no copies; repeats share the columns `shared`."""
-        was_set = np.column_stack([as_numbers(self.columns[name]) for name in shared])
-        self._set_aside_copies(was_set, self.measured.to_numpy())
+        was_set = np.column_stack([np.zeros(len(self.table)), *(as_numbers(self.columns[name]) for name in shared)])
+        of_traces = self._traces(was_set) if self.declared.trace else {}
+        if not of_traces:
+            self._set_aside_copies(was_set, self.measured.to_numpy())
         usable, outputs, specimen = self.usable, self.declared.outputs, self.declared.specimen
         condition = np.unique(was_set[usable], axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
+        if of_traces:
+            condition = same_times(condition, of_traces["trace"], of_traces["time"])
         y = pd.DataFrame({name: self._compared(name, usable, condition) for name in outputs})
         # At a gap stands the mean of the repeats, or of all runs, so that all arithmetic is finite.
         y = y.fillna(y.groupby(condition).transform("mean")).fillna(y.mean())
@@ -157,6 +166,7 @@ class TableReader:
             "completion": without_gaps(self.missing.to_numpy()[usable]),
             "specimen": specimens,
             "specimen_names": specimen_names,
+            **of_traces,
             "lines": self.table.index.to_numpy()[usable] if self.table.index.name == LINE else None,
             "output_titles": {name: output.title or name for name, output in outputs.items()},
             "output_scales": {
@@ -165,6 +175,41 @@ class TableReader:
                 if output.kind == "difference"
             },
         }
+
+    def _traces(self, was_set: Floats) -> dict[str, Any]:
+        """Check the traces, set aside those that cannot be used, and make their fields of `Runs`."""
+        column, time = self.declared.trace, self.columns[self.declared.time]
+        assert column is not None
+        first: dict[bytes, str] = {}
+        for rows in self._rows_of_traces():
+            name = f"trace {self.columns[column][rows[0]]}"
+            if (back := np.flatnonzero(np.diff(time[rows]) < 0)).size:
+                at = row_name(self.table, int(rows[back[0] + 1]))
+                raise InputError(
+                    f"{name} goes back in time in {at}: sort the table, or give what are two traces two names"
+                )
+            content = np.column_stack([time[rows], was_set[rows], self.measured.iloc[rows]]).tobytes()
+            same = first.setdefault(content, name)
+            bad = np.isin(np.arange(len(self.table)), rows)
+            if len(rows) < FEWEST_READINGS:
+                self.set_aside(bad, f"{name} has {len(rows)} reading{'s' * (len(rows) > 1)} only")
+            elif same != name:
+                self.set_aside(bad, f"{name} repeats {same}, value for value")
+        usable = self.usable
+        trace, names = self._levels(column, usable)
+        return {"trace": trace, "trace_names": names, "time": time[usable], "time_name": self.declared.time}
+
+    @property
+    def of_first_trace(self) -> Flags:
+        """The rows of the trace of the first faultless row, (n,)."""
+        names = self.columns[self.declared.trace]
+        return np.asarray(names == names[int(np.argmax(self.faultless))])
+
+    def _rows_of_traces(self) -> list[Integers]:
+        """List the faultless rows of each trace."""
+        rows = np.flatnonzero(self.faultless)
+        number = np.unique(self.columns[self.declared.trace][rows], return_inverse=True)[1].reshape(-1)
+        return np.split(rows[np.argsort(number, kind="stable")], np.cumsum(np.bincount(number))[:-1])
 
     def _compared(self, name: str, usable: Flags, condition: Integers) -> pd.Series:
         """Return an output of the usable rows as it is compared, (n',)."""
@@ -187,6 +232,24 @@ class TableReader:
         distinct, number = np.unique(self.columns[name][usable], return_inverse=True)
         names = [f"{name} {value:g}" if distinct.dtype.kind == "f" else str(value) for value in distinct]
         return number.reshape(-1).astype(np.int64), tuple(names)
+
+
+def same_times(settings: Integers, trace: Integers, time: Floats) -> Integers:
+    """Number readings (n,) so that those of equal settings share a number where their times are the same.
+
+    They are the same within half a step of the longest trace of these settings.
+    """
+    key = np.zeros((len(time), 3))  # settings, and the time in the grid of their longest trace, or beside it
+    for kind in np.unique(settings):
+        rows = np.flatnonzero(settings == kind)
+        longest = np.argmax(np.bincount(trace[rows]))
+        grid = np.unique(time[rows][trace[rows] == longest])
+        middles = (grid[1:] + grid[:-1]) / 2
+        nearest = np.searchsorted(middles, time[rows])
+        step = np.diff(grid, prepend=2 * grid[0] - grid[1] if len(grid) > 1 else grid[0] - 1)
+        near = np.abs(time[rows] - grid[nearest]) <= step[nearest] / 2
+        key[rows] = np.stack([settings[rows], np.where(near, nearest, -1), np.where(near, 0.0, time[rows])], 1)
+    return np.unique(key, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
 
 
 def is_missing(values: Floats | Words) -> Flags:

@@ -18,6 +18,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from calibration.linear.gls import repeat_count, repeat_covariance
+from calibration.linear.memory import Memory
 from calibration.table.excluded import Excluded, count_of_rows, summary_of_excluded
 from common.arrays import Flags, Floats, Integers
 
@@ -26,6 +27,7 @@ FEWEST_REPEATS = 8  # runs, for a covariance from repeats alone
 _LEAST_OF_A_DESIGN = 1.5  # degrees of freedom, per output, that a design of repeats must leave
 _KINDS = 3  # values of an input of which some can predict the others
 _CUBIC = 0.2  # share of a cube that lower powers must leave
+_BLOCKS = 5  # of a trace, that are resampled
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,15 @@ class Runs:
     output_scales: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     unit_checked: Mapping[str, bool] = field(default_factory=dict)  # outputs of which it may be declared
     differing: Floats | None = None  # (n, c) by which repeats were found to differ
+    trace: Integers | None = None  # (n,) 0, 1, …: runs are readings of traces, sorted by trace, then by time
+    trace_names: tuple[str, ...] = ()  # by number
+    time: Floats | None = None  # (n,) of a reading
+    time_name: str = "time"
+    # Of the noise along traces. With it y is white along them, and so is what is predicted.
+    memory: Memory | None = None
+    noise_of_traces: tuple[Floats, float] | None = None  # S and its degrees of freedom; see `statistics.traces`
+    heads: Flags | None = None  # (n,) see `left_out`
+    states: Mapping[str, Floats] = field(default_factory=dict)  # (n,) of readings, beside the inputs
 
     @property
     def scale(self) -> Floats:
@@ -66,8 +77,54 @@ class Runs:
     def __len__(self) -> int:
         return len(self.y)
 
+    @property
+    def along(self) -> Floats:
+        """What a shift of all runs of a session is in each of them, (n,)."""
+        return self.scale if self.memory is None else self.scale * self.memory.level
+
+    def groups(self, kind: str) -> tuple[Integers, tuple[str, ...]]:
+        """Number the traces, sessions or specimens of the runs, (n,), and name them."""
+        number = getattr(self, kind)
+        assert number is not None
+        return number, getattr(self, f"{kind}_names")
+
+    def raw(self, table: Floats) -> Floats:
+        """Take the whitening from a table (n, …)."""
+        return table if self.memory is None else self.memory.colour(table)
+
+    def whitened(self, table: Floats) -> Floats:
+        """Whiten a table (n, …) along traces."""
+        return table if self.memory is None else self.memory.whiten(table)
+
+    def left_out(self, rows: Flags) -> Flags:
+        """Return runs (n,) less those to which a group's own numbers are fitted where it is left out."""
+        return rows if self.heads is None else rows & ~self.heads
+
+    @property
+    def together(self) -> Integers:
+        """Number what is left out together, (n,): conditions, or traces."""
+        return self.condition if self.trace is None else self.trace
+
+    @property
+    def resampled(self) -> Integers:
+        """Number what is resampled, (n,): conditions, or a fifth of a trace."""
+        if self.trace is None:
+            return self.condition
+        first, count = np.unique(self.trace, return_index=True, return_counts=True)[1:]
+        place = np.arange(len(self)) - np.repeat(first, count)
+        return np.asarray(self.trace * _BLOCKS + place * _BLOCKS // np.repeat(count, count))
+
+    @property
+    def known_covariance(self) -> Floats | None:
+        """S, (k, k), where it is not estimated from runs."""
+        if self.noise_of_traces is not None:
+            return self.noise_of_traces[0]
+        return None if self.sigma is None else np.diag(self.sigma**2)
+
     def noise(self, rows: Flags) -> tuple[Floats, float]:
         """Estimate S (k, k) from the runs in `rows`, with its degrees of freedom, unless it is declared."""
+        if self.noise_of_traces is not None:
+            return self.noise_of_traces
         if self.sigma is not None:
             return np.diag(self.sigma**2), math.inf
         repeats = self.repeats(rows)
@@ -141,6 +198,8 @@ class Runs:
         """
         session, noted = self.session[rows], self.noted_of_repeats[rows]
         condition = self.repeat_ids[rows]
+        if self.trace is not None:  # their noise is not estimated from runs
+            return condition
         alone = self._alone(rows)
         differing = np.empty((len(condition), 0)) if self.differing is None else self.differing[rows]
         if (count := repeat_count(condition)) < FEWEST_REPEATS:
@@ -196,7 +255,7 @@ class Runs:
     @property
     def partners(self) -> Floats:
         """Settings (n, q) that runs must share so that a shift between them is no effect of a setting."""
-        return self.inputs
+        return self.inputs if self.trace is None else self.inputs[:, :-1]  # but for the time
 
     @property
     def settings(self) -> dict[str, tuple[Floats, str]]:
@@ -228,7 +287,10 @@ class Runs:
         """Choose the runs in `rows`: flags (n,), or places."""
         of_runs = {k: v for k, v in vars(self).items() if isinstance(v, np.ndarray) and k != "sigma"}
         arrays: dict[str, Any] = {k: v[rows] for k, v in of_runs.items()}
-        return replace(self, **arrays, notes={name: values[rows] for name, values in self.notes.items()})
+        of_names = {
+            key: {name: values[rows] for name, values in getattr(self, key).items()} for key in ("notes", "states")
+        }
+        return replace(self, **arrays, **of_names)
 
 
 def without_gaps(gaps: Flags) -> Floats:
@@ -263,10 +325,12 @@ def features(runs: Runs, used: Flags | slice) -> tuple[tuple[str, ...], Floats]:
 
     Standardised on the runs in `used` (n,).
     """
-    spread = runs.inputs[used].std(0)
+    given = np.column_stack([runs.inputs, *runs.states.values()])
+    spread = given[used].std(0)
     varied = np.flatnonzero(spread > 1e-9).tolist()
-    inputs = (runs.inputs[:, varied] - runs.inputs[used][:, varied].mean(0)) / spread[varied]
-    names, columns = [runs.input_names[i] for i in varied], list(inputs.T)
+    inputs = (given[:, varied] - given[used][:, varied].mean(0)) / spread[varied]
+    given_names = (*runs.input_names, *runs.states)
+    names, columns = [given_names[i] for i in varied], list(inputs.T)
     for i in range(len(varied)):
         for j in range(i, len(varied)):
             product = inputs[:, i] * inputs[:, j]
@@ -278,6 +342,6 @@ def features(runs: Runs, used: Flags | slice) -> tuple[tuple[str, ...], Floats]:
         weights = np.linalg.lstsq(lower[used], column[used] ** 3, rcond=None)[0]
         cube = column**3 - lower @ weights  # beyond lower powers; little for two or three levels
         if cube[used].std() > _CUBIC * (column[used] ** 3).std():
-            names.append(f"({runs.input_names[i]})³")
+            names.append(f"({given_names[i]})³")
             columns.append(cube / cube[used].std())
     return tuple(names), np.stack(columns, 1) if columns else np.empty((len(runs), 0))

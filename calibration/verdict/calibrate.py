@@ -50,6 +50,7 @@ from calibration.statistics.study import (
     find_outliers,
     split_runs,
 )
+from calibration.statistics.traces import whiten_traces
 from calibration.statistics.weights import (
     alike,
     caveat_of_weights,
@@ -57,6 +58,7 @@ from calibration.statistics.weights import (
     noise_of_any_run,
     rows_of_little_weight,
 )
+from calibration.table.between_repeats import Difference
 from calibration.table.excluded import caveat_of_excluded
 from calibration.table.unit_slips import refuse_unit_slips
 from calibration.verdict.describe import adopt_in_turns, forms_in_question
@@ -100,7 +102,9 @@ def calibrate(
         verdict: makes the verdict of what was found, such as one with the corrected robot.
     """
     limit, began, given = limit or Work(), beginning(), model
-    model, differences = with_differences(model, held_out, level=level, seed=seed)
+    differences: tuple[Difference, ...] = ()
+    if model.runs.trace is None:
+        model, differences = with_differences(model, held_out, level=level, seed=seed)
     study, base, uncalibrated = first_fit(model, held_out, level=level, seed=seed, draws=draws, progress=progress)
     model = cast(Experiment, study.model)  # with the weights of its runs
     # Explanations come first; what is left of the limit is for descriptions of what nothing explains.
@@ -240,6 +244,9 @@ def first_fit(model: Experiment, held_out: Flags | None = None, **settings: Any)
     model.check(given)
     refuse_unit_slips(model.runs, given)
     study = Study(model, split_runs(model.runs, held_out, find_outliers(model.runs, given)), **settings)
+    if model.runs.trace is not None:
+        study, start = whiten_traces(study, start)
+        return *fit_weighted(study, start), study.model.runs.whitened(given)
     guess = model.runs.guessed_noise(study.split.fitted, model.runs.y - given)
     study = replace(study, model=with_runs(model, **guess))
     return *fit_weighted(study, model.guess(start, study.split.fitted)), given
@@ -271,7 +278,7 @@ def _handed_on(study: Study, attribution: Attribution, errors: HeldOutErrors) ->
 def _next_runs(rivals: tuple[Hypothesis, ...], seed: int) -> dict[str, Any]:
     """Plan the runs that would tell rivals apart; none without rivals, or if one breaks down at such runs."""
     with suppress(InputError):
-        if rivals and not skipped("next runs"):
+        if rivals and rivals[0].model.runs.trace is None and not skipped("next runs"):
             return dict(zip(("next_runs", "next_batch"), next_runs(rivals, seed=seed), strict=True))
     return {"next_runs": (), "next_batch": None}
 

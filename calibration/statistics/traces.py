@@ -1,0 +1,192 @@
+"""Runs that are readings of traces: the noise along a trace, and a model whose runs and predictions are white.
+
+**Noise.** Readings of a trace have the covariance S ⊗ R (`calibration.linear.memory`). S, s and τ come from repeated
+traces: what these share is no noise, so a missing effect does not hide in R. With J traces of equal
+settings, at the times that all of them have, the residuals r_j of a first fit give J − 1 series
+
+    d_c = Σ_j h_cj r_j,   h orthonormal, each row with the sum 0,
+
+in which the model's misfit cancels. A number that each trace, session or specimen has of its own is absorbed along
+its derivative, and so is a level. Without repeats S, s and τ come from what all parameters and effects leave of
+each trace. This may contain what the model lacks, so the noise counts as unknown.
+
+**White runs.** `Whitened` multiplies what was measured and what is predicted by L⁻¹, R = L Lᵀ, trace by trace. Fits,
+tests and bootstrap see rows that are white but for S and the scatter of sessions, and know of no traces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import helmert
+
+from calibration.linear.memory import Memory, Series, estimate_memory
+from calibration.statistics.fit import Fit, fit
+from calibration.statistics.forward import derivatives
+from calibration.statistics.statistical_model import (
+    Experiment,
+    Parameter,
+    Parameters,
+    Predict,
+    Wrapped,
+    start_values,
+    with_runs,
+)
+from calibration.statistics.study import Study
+from calibration.table.runs import Runs
+from common.arrays import Flags, Floats, Integers
+
+_MORE = 3  # readings, beside what a series absorbs
+_LENGTH = 0.5  # least share of the longest repeat
+_SEEN = 1e-8  # least share of the largest singular value
+_ABSORBED = 1 / 3  # most columns of a trace without repeats, over its readings
+
+
+@dataclass(frozen=True)
+class Whitened(Wrapped):
+    """A model of readings of traces, white along these."""
+
+    memory: Memory
+
+    @property
+    def runs(self) -> Runs:
+        inner = self.inner.runs
+        known = self.__dict__.get("_white")
+        if known is None or known[0] is not inner:
+            known = inner, replace(inner, y=self.memory.whiten(inner.y), memory=self.memory)
+            object.__setattr__(self, "_white", known)
+        return known[1]
+
+    @property
+    def coefficients(self) -> tuple[Parameter, ...]:
+        return self.inner.coefficients
+
+    def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
+        """Predict (P, n, k), see `ForwardModel`."""
+        return self._white_sets(self.inner.predict(sets, title=title))
+
+    def linearised(
+        self, at: Parameters, along: Sequence[Parameter], *, title: str = "", quick: bool = False
+    ) -> Predict:
+        """Return the linear model, see `ForwardModel`."""
+        predict = self.inner.linearised(at, along, title=title, quick=quick)
+        return lambda sets: self._white_sets(predict(sets))
+
+    def _white_sets(self, predictions: Floats) -> Floats:
+        return np.moveaxis(self.memory.whiten(np.moveaxis(predictions, 0, -1)), -1, 0)
+
+    def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
+        """Return the start as it is: it comes from a fit."""
+        return start
+
+    def possible(self) -> tuple[Any, list[dict[str, Any]]]:
+        """Return no runs: a reading alone cannot be made again."""
+        return self, []
+
+
+def whiten_traces(study: Study, start: dict[str, float]) -> tuple[Study, dict[str, float]]:
+    """Estimate the noise of a study's traces from a first fit, and let its model be white in it.
+
+    Returns:
+        The study, and the parameters of the first fit.
+    """
+    plain, used = study.model, study.split.fitted
+    runs = plain.runs
+    spread = (runs.y - plain.predict([start])[0])[used].var(0)
+    rough = np.diag(np.where(spread > 0, spread, 1.0))
+    model = with_runs(plain, noise_of_traces=(rough, float(used.sum())))
+    names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
+    first = fit(model, start, names, used, title="fit" if study.progress else "")
+    # Repeats are compared with each other, not with the model, so those too take part that are held out.
+    series = list(_of_repeats(first, runs))
+    known = bool(series) and runs.noise_known
+    noise = estimate_memory(series or list(_of_traces(study, first, used)))
+    assert runs.trace is not None
+    assert runs.time is not None
+    memory = Memory(runs.trace, runs.time, noise.share, noise.tau)
+    changes = {"noise_of_traces": (noise.run_covariance, noise.freedom), "noise_known": known, "sigma": None}
+    inner: Any = with_runs(plain, **changes, states=_states(runs, first.prediction))
+    return replace(study, model=Whitened(inner, memory)), first.parameters
+
+
+def _of_repeats(first: Fit, runs: Runs) -> Iterator[Series]:
+    """Yield the series of each set of repeated traces."""
+    residual, own = runs.y - first.prediction, _places_of_numbers(first)
+    for rows in _repeated(runs):  # (J, t)
+        assert runs.time is not None
+        time = runs.time[rows].mean(0)
+        contrasts = np.tensordot(helmert(len(rows)), residual[rows], 1)  # (J - 1, t, k)
+        along = first.jacobian[rows]  # (J, t, k, p)
+        columns = [along[..., places].sum(-1).mean(0) for places in own.values()]  # (t, k) each
+        absorbed = np.column_stack([np.ones(len(time)), *columns])
+        if len(time) >= absorbed.shape[1] + _MORE:
+            yield Series(time, np.moveaxis(contrasts, 0, 1), absorbed)
+
+
+def _places_of_numbers(first: Fit) -> dict[str, list[int]]:
+    """Find what groups have of each number of their own among the parameters of a fit."""
+    own: dict[str, list[int]] = {}
+    for place, parameter in enumerate(first.fitted):
+        if parameter.of_group:
+            own.setdefault(parameter.of_group[0], []).append(place)
+    return own
+
+
+def _repeated(runs: Runs) -> Iterator[Integers]:
+    """Yield the rows (J, t) of readings that each set of repeated traces has in common, in the order of time.
+
+    A trace of less than half of the longest one is left out.
+    """
+    assert runs.trace is not None
+    conditions = [set(runs.condition[runs.trace == trace].tolist()) for trace in range(len(runs.trace_names))]
+    left = list(range(len(conditions)))
+    while left:
+        alike = [trace for trace in left if conditions[trace] & conditions[left[0]]]
+        left = [trace for trace in left if trace not in alike]
+        longest = max(len(conditions[trace]) for trace in alike)
+        alike = [trace for trace in alike if len(conditions[trace]) >= _LENGTH * longest]
+        shared = set.intersection(*(conditions[trace] for trace in alike))
+        if len(alike) > 1 and shared:
+            yield np.stack([_first_of_each(runs, runs.trace == trace, shared) for trace in alike])
+
+
+def _first_of_each(runs: Runs, rows: Flags, shared: set[int]) -> Integers:
+    """Return the first reading of a trace with each of some conditions."""
+    places = np.flatnonzero(rows & np.isin(runs.condition, list(shared)))
+    return np.asarray(places[np.sort(np.unique(runs.condition[places], return_index=True)[1])])
+
+
+def _of_traces(study: Study, first: Fit, used: Flags) -> Iterator[Series]:
+    """Yield a series for each trace: its residual, less what parameters and effects may change in it."""
+    runs = study.model.runs
+    assert runs.trace is not None
+    assert runs.time is not None
+    effects = derivatives(first.model, first.parameters, study.effects)[1] if study.effects else None
+    every = np.concatenate([first.jacobian, *([] if effects is None else [effects])], -1)
+    residual = runs.y - first.prediction
+    for trace in np.unique(runs.trace[used]):
+        rows = used & (runs.trace == trace)
+        columns = np.column_stack([np.ones(rows.sum()), every[rows].reshape(rows.sum(), -1)])
+        columns = columns / np.maximum(np.abs(columns).max(0), 1e-300)
+        vectors, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+        seen = min(int((sizes > _SEEN * sizes[0]).sum()), int(_ABSORBED * rows.sum()))
+        yield Series(runs.time[rows], residual[rows][:, None], vectors[:, :seen])
+
+
+def _states(runs: Runs, prediction: Floats) -> dict[str, Floats]:
+    """Name what a residual may depend on beside settings and time: each output, and its rate of change."""
+    assert runs.trace is not None
+    assert runs.time is not None
+    states = {}
+    for place, name in enumerate(runs.outputs):
+        values, rate = prediction[:, place], np.zeros(len(runs))
+        for trace in np.unique(runs.trace):
+            rows = np.flatnonzero(runs.trace == trace)
+            time, first = np.unique(runs.time[rows], return_index=True)
+            slope = np.gradient(values[rows][first], time)
+            rate[rows] = np.interp(runs.time[rows], time, slope)
+        states |= {name: values, f"rate of {name}": rate}
+    return states
