@@ -52,6 +52,10 @@ def groups_that_may_differ(runs: Runs) -> list[tuple[str, Flags]]:
     if runs.specimen is not None:
         candidates += [(f"on specimen {name}", runs.specimen == i) for i, name in enumerate(runs.specimen_names)]
     present = np.unique(session).tolist()  # a part of the runs may have none of a session
+    if runs.trace is not None and len(present) == len(
+        np.unique(runs.trace)
+    ):  # a trace may have numbers of its own
+        present = []
     candidates += [(f"in session {names[i]}", session == i) for i in present]
     by_time = sorted(present, key=lambda i: int(runs.rows[session == i].min()))
     candidates += [
@@ -83,7 +87,8 @@ def find_moves(study: Study, base: Fit) -> tuple[Study, Fit, tuple[Hypothesis, .
         for words, rows in groups_that_may_differ(plain.runs)
         if min((rows & used).sum(), (~rows & used).sum()) >= _FEWEST
     ]
-    numbers = (*plain.coefficients, *plain.nuisances, *(e for e in plain.effects if e.name in base.names))
+    shared = [p for p in (*plain.coefficients, *plain.nuisances) if not p.of_group]
+    numbers = (*shared, *(e for e in plain.effects if e.name in base.names))
     moves: tuple[Hypothesis, ...] = ()
     while groups and len(moves) < _MOST and not skipped("numbers that differ in some runs"):
         scores = _clearest(study, base, groups, numbers)

@@ -56,6 +56,7 @@ from common.arrays import Flags, Floats, Integers
 UNKNOWN_RATIO = 1.0  # ρ where nothing is known about it
 _MOST_SCATTER = 9.0  # largest ρ
 _LEAST_FREEDOM = 0.5  # degrees of freedom of the sessions' means below which ρ is unknown
+_NOTHING = 1e-12  # size of a session whose shift is absorbed
 _RIDGE = 1e-11  # so that columns without any signal get a large variance
 
 
@@ -156,6 +157,12 @@ class Regression:
         self.means = self.average(self.columns)  # (s, k, m)
         whole = np.einsum("nim,njl->ijml", self.columns, self.columns, optimize=True)
         self._whole = whole.reshape(k * k, m * m)
+
+    def seen(self, columns: Floats, along: Floats) -> Regression:
+        """Return the regression of the same runs with other columns (n, k, m), and shifts of sessions."""
+        return Regression(
+            columns, self.precision, self.session, self.scale, self.repeated, self.completion, self.declared, along
+        )
 
     def average(self, table: Floats) -> Floats:
         """Average each session, times the root of its size, (s, ...), of (n, ...)."""
@@ -398,7 +405,7 @@ def averaging_rows(session: Integers, scale: Floats | None = None) -> tuple[Floa
     along = np.ones(len(session)) if scale is None else scale
     rows = (np.arange(len(kinds))[:, None] == place.reshape(-1)) * along
     sizes = (rows**2).sum(1)
-    return rows / np.sqrt(sizes)[:, None], sizes
+    return rows / np.sqrt(np.maximum(sizes, _NOTHING))[:, None], sizes
 
 
 def repeat_covariance(y: Floats, repeated: Integers | Floats, scale: Floats | None = None) -> Floats:

@@ -172,7 +172,7 @@ class Model:
                     f"{what} of a model are each an sf.{kind.__name__}, one at least; given: {given!r}"
                 )
         if self.time is None and any(number.per == "trace" for number in self.numbers):
-            raise InputError("a number per trace needs the column of the time: sf.Model(…, time=\"t_s\")")
+            raise InputError('a number per trace needs the column of the time: sf.Model(…, time="t_s")')
         names_once(parameter.name for parameter in self.parameters)
 
     def without(self, *names: str) -> Model:

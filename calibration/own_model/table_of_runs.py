@@ -22,7 +22,15 @@ from calibration.own_model.declared import Model
 from calibration.own_model.function_model import AskedColumns, FunctionModel, TableRuns, evaluate
 from calibration.statistics.study import middle_session
 from calibration.table.excluded import MANY
-from calibration.table.reader import FEWEST_READINGS, Declaration, TableReader, as_numbers, is_missing, open_table, require
+from calibration.table.reader import (
+    FEWEST_READINGS,
+    Declaration,
+    TableReader,
+    as_numbers,
+    is_missing,
+    open_table,
+    require,
+)
 from calibration.table.runs import FEWEST_REPEATS
 from common.arrays import Flags, Floats, Integers, Words
 from common.errors import InputError, naming
@@ -140,7 +148,9 @@ def _read(original: pd.DataFrame, model: Model, roles: Roles) -> FunctionModel:
         caveats=(),
         sigma=_sigma(model, roles.noise),
         noise_known=roles.noise != "unknown",
-        notes={} if model.time else _notes(columns, [*needed, *_names(roles.held_out)], roles.notes, good, known["condition"]),
+        notes={}
+        if model.time
+        else _notes(columns, [*needed, *_names(roles.held_out)], roles.notes, good, known["condition"]),
         unit_checked={name: output.unit_checked for name, output in model.outputs.items()},
         words=frozenset(name for name in settings if columns[name].dtype.kind != "f"),
         converted=converted,

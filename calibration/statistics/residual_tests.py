@@ -41,6 +41,7 @@ import numpy as np
 from calibration.linear.gls import (
     Groups,
     NormalEquations,
+    Regression,
     inverse_root,
     schur_complement,
     solve_normal,
@@ -158,17 +159,20 @@ class _Tester:
     """
 
     def __init__(self, data: Runs, used: Flags, fitted: Fit, D: Floats):
-        self.p = len(fitted.names)
-        self.pulled = np.array([p.sigma is not None and not p.grid for p in fitted.fitted], dtype=bool)
-        repeated = data.repeats(used)
-        self.design = regression(data, used, np.concatenate([fitted.tangents, D], -1), fitted.fitted, repeated)
+        self.absorbed = _Absorbed(data, used, fitted)
+        kept = self.absorbed.kept
+        numbers = [fitted.fitted[place] for place in kept]
+        self.p = len(kept)
+        self.pulled = np.array([p.sigma is not None and not p.grid for p in numbers], dtype=bool)
+        columns = np.concatenate([fitted.tangents[..., kept], D], -1)
+        self.design = self.absorbed.regression(columns, numbers, data.repeats(used))
         self.J, scale = self.design.columns[..., : self.p], self.design.scale
         inputs = data.inputs[used]
         spread = inputs.std(0)
         inputs = (data.inputs - inputs.mean(0)) / np.where(spread > 0, spread, 1.0)
         self.smooth = data.whitened(kernel_factor(inputs))[used] * scale[:, None]  # (n', r)
         self.names, self.F = features(data, used)
-        self.F = data.whitened(self.F)[used] * scale[:, None]
+        self.F = self.absorbed.project(data.whitened(self.F)[used]) * scale[:, None]
         self.conditions = Groups.of(data.condition[used])
         self.condition_sizes = self.conditions.add(scale[:, None] ** 2)  # (c, 1)
         self.F_means = self.design.average(self.F)  # (s, f)
@@ -181,6 +185,7 @@ class _Tester:
         Each residual is judged in its own noise.
         """
         run_covariance = self.design.noise(residual)
+        residual = np.moveaxis(self.absorbed.project(np.moveaxis(residual, 0, -1)), -1, 0)
         products, root = self.design.products(residual, run_covariance), inverse_root(run_covariance)  # (B, k, k)
         base = products.take(np.array([[*range(self.p), -1]]))
         projected = projected_scores(products, self.p)
@@ -221,6 +226,50 @@ class _Tester:
         seen = projected > TESTABLE**2 * square
         z = np.where(seen, score / np.sqrt(np.where(seen, projected, 1.0)), 0.0)
         return np.asarray(z).reshape(count, k, -1)
+
+
+class _Absorbed:
+    """The numbers that each trace has of its own, without priors: they are taken from all columns, trace by trace.
+
+    So many traces cost no more than the small solves of each. It is exact for one output: what is left of Σ is
+    I + ρ (P a)(P a)ᵀ with P the projection and a what a shift of the session is. Of several outputs, which S
+    connects, none is taken away.
+    """
+
+    def __init__(self, data: Runs, used: Flags, fitted: Fit):
+        single = data.trace is not None and data.y.shape[1] == 1
+        own = [
+            place
+            for place, p in enumerate(fitted.fitted)
+            if single and p.of_group and p.of_group[1] in data.trace_names and p.sigma is None
+        ]
+        self.data, self.used = data, used
+        self.kept = [place for place in range(len(fitted.fitted)) if place not in own]
+        self.bases: list[
+            tuple[Integers, Floats]
+        ] = []  # rows of a trace among those used, and an orthonormal basis
+        for trace in np.unique(data.trace[used]) if own and data.trace is not None else ():
+            rows = np.flatnonzero(data.trace[used] == trace)
+            columns = fitted.tangents[used][rows, 0][:, own]
+            columns = columns[:, np.abs(columns).max(0) > 0]
+            self.bases.append((rows, np.linalg.qr(columns)[0]))
+
+    def project(self, table: Floats) -> Floats:
+        """Take from a table (n', …) what numbers of traces can change."""
+        table = table.copy() if self.bases else table
+        for rows, basis in self.bases:
+            part = table[rows]
+            table[rows] = part - np.tensordot(basis, np.tensordot(basis.T, part, 1), 1)
+        return table
+
+    def regression(
+        self, columns: Floats, numbers: Sequence[Parameter], repeated: Integers | Floats | None
+    ) -> Regression:
+        """Regress the runs on columns (n, k, m), the first those of `numbers`."""
+        linear = regression(self.data, self.used, columns, numbers, repeated)
+        if not self.bases:
+            return linear
+        return linear.seen(self.project(columns[self.used]), self.project(self.data.along[self.used]))
 
 
 def kernel_factor(inputs: Floats) -> Floats:
@@ -280,8 +329,11 @@ def examine_residual(
     shift = fitted.jacobian[used] @ prior_offsets(fitted.fitted, fitted.parameters)
     observed = tester.scores(residual[None] + shift)
     free = tester.design.precision == 0
-    columns = np.concatenate([fitted.tangents[..., free], directions.table], -1)
-    exact = regression(data, used, columns, (), tester.design.repeated).products(residual)
+    numbers = np.array(tester.absorbed.kept, dtype=int)[free]
+    columns = np.concatenate([fitted.tangents[..., numbers], directions.table], -1)
+    exact = tester.absorbed.regression(columns, (), tester.design.repeated).products(
+        tester.absorbed.project(residual)
+    )
     testable = observed.survived[0] >= TESTABLE
     rng = np.random.default_rng(study.seed)
     run_covariance = tester.design.noise(residual)

@@ -100,9 +100,7 @@ def _axes(run: Floats, lack: Floats) -> tuple[Floats, Floats]:
     return vectors.T @ root, np.maximum(values, _LACK)
 
 
-def _expect(
-    white: Floats, weights: Floats, groups: Groups, lack: Floats, share: float, ratio: float
-) -> _Expected:
+def _expect(white: Floats, weights: Floats, groups: Groups, lack: Floats, share: float, ratio: float) -> _Expected:
     """Compute the departures of the conditions from the weights of the runs, and then these weights."""
     variance = 1 / (groups.add(weights[..., None]) + 1 / lack)
     departure = groups.add(weights[..., None] * white) * variance

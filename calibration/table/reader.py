@@ -142,7 +142,9 @@ class TableReader:
 
     def runs(self, shared: Sequence[str]) -> dict[str, Any]:
         """Make fields of `Runs` of the usable rows that are no copies; repeats share the columns `shared`."""
-        was_set = np.column_stack([np.zeros(len(self.table)), *(as_numbers(self.columns[name]) for name in shared)])
+        was_set = np.column_stack(
+            [np.zeros(len(self.table)), *(as_numbers(self.columns[name]) for name in shared)]
+        )
         of_traces = self._traces(was_set) if self.declared.trace else {}
         if not of_traces:
             self._set_aside_copies(was_set, self.measured.to_numpy())
