@@ -90,7 +90,7 @@ def find_moves(study: Study, base: Fit) -> tuple[Study, Fit, tuple[Hypothesis, .
     shared = [p for p in (*plain.coefficients, *plain.nuisances) if not p.of_group]
     numbers = (*shared, *(e for e in plain.effects if e.name in base.names))
     moves: tuple[Hypothesis, ...] = ()
-    while groups and len(moves) < _MOST and not skipped("numbers that differ in some runs"):
+    while groups and numbers and len(moves) < _MOST and not skipped("numbers that differ in some runs"):
         scores = _clearest(study, base, groups, numbers)
         known = tuple(map(shift_of, moves))
         fitted = [move for shift, z in scores for move in _fitted(plain, known, shift, z, base, used)]

@@ -45,7 +45,9 @@ from calibration.linear.gls import (
     inverse_root,
     schur_complement,
     solve_normal,
+    square_root,
 )
+from calibration.linear.memory import Memory
 from calibration.statistics.budget import skipped
 from calibration.statistics.fit import LEARNT, Fit
 from calibration.statistics.forward import derivatives
@@ -58,7 +60,7 @@ TESTABLE = 0.03  # an effect cannot be tested if less than this share of its sig
 GENERAL = ("lack", "kernel", "shape", "pull")
 _PASSES = 3  # iterations for the scatter of the sessions
 _PASSES_OF_A_SCORE = 2
-_AT_ONCE = 50  # draws
+_AT_ONCE, _OF_TRACES_AT_ONCE = 50, 200  # draws
 _FEWEST_DRAWS = 100  # where no time is left
 _MOST_PLACES, _LANDMARKS = 1000, 200  # distinct inputs between which a kernel is computed, and those of more
 _SEEN = 1e-2  # share of the largest eigenvalue of the kernel between these that counts
@@ -228,6 +230,49 @@ class _Tester:
         return np.asarray(z).reshape(count, k, -1)
 
 
+class _Nulls:
+    """The statistics of draws; along traces each draw is judged in the memory that its own repeats show."""
+
+    def __init__(self, tester: _Tester, data: Runs, used: Flags, fitted: Fit, D: Floats):
+        self.tester, self.data, self.used, self.fitted, self.D = tester, data, used, fitted, D
+        self.others: dict[int, tuple[Memory, _Tester]] = {}  # by their places in `NoiseOfTraces.as_likely`
+
+    def statistics(self, drawn: Floats, testable: Flags, rng: np.random.Generator) -> Floats:
+        """Compute the general statistics, and the largest score, of draws (B, n', k), (B, 5)."""
+        noise, memory = self.data.noise_of_traces, self.data.memory
+        if noise is None or memory is None or not self.data.noise_known:
+            return _row(self.tester.scores(drawn), testable)
+        count, _, k = drawn.shape
+        white = rng.normal(size=(len(self.data), count, k)) @ square_root(noise.run_covariance).T
+        white[self.used] = np.moveaxis(drawn, 0, 1)
+        plain = memory.colour(white)
+        places, run_covariance = noise.estimated(plain)
+        # As if S were that of the fit: its own is in the residual.
+        scale = np.linalg.solve(inverse_root(noise.run_covariance), inverse_root(run_covariance))
+        result = np.empty((count, len(GENERAL) + 1))
+        for place in np.unique(places).tolist():
+            some = places == place
+            other, tester = self._at(place, memory)
+            residual = np.moveaxis(other.whiten(plain[:, some]), 0, 1)[:, self.used]
+            result[some] = _row(tester.scores(residual @ np.swapaxes(scale[some], -1, -2)), testable)
+        return result
+
+    def _at(self, place: int, memory: Memory) -> tuple[Memory, _Tester]:
+        """Return another memory, and a tester with all columns white in it."""
+        if place not in self.others:
+            assert self.data.noise_of_traces is not None
+            share, tau = self.data.noise_of_traces.as_likely[place]
+            other = replace(memory, share=share, tau=tau)
+            J, D = (other.whiten(memory.colour(columns)) for columns in (self.fitted.jacobian, self.D))
+            data, fitted = replace(self.data, memory=other), replace(self.fitted, jacobian=J)
+            self.others[place] = other, _Tester(data, self.used, fitted, D)
+        return self.others[place]
+
+
+def _row(scores: Scores, testable: Flags) -> Floats:
+    return np.column_stack([scores.general, _largest(scores.z, testable)])
+
+
 class _Absorbed:
     """The numbers that each trace has of its own, without priors: they are taken from all columns, trace by trace.
 
@@ -338,13 +383,12 @@ def examine_residual(
     rng = np.random.default_rng(study.seed)
     run_covariance = tester.design.noise(residual)
     statistics = np.append(observed.general[0], _largest(observed.z, testable))
+    nulls = _Nulls(tester, data, used, fitted, directions.table)
     batches: list[Floats] = []
     while (drawn := sum(map(len, batches))) < (draws or study.draws):
-        count = min(_AT_ONCE, max(1, _VALUES // residual.size), (draws or study.draws) - drawn)
-        null = tester.scores(
-            tester.design.draw(rng, run_covariance, np.tile(observed.session_ratio[0], (count, 1)))
-        )
-        batches.append(np.column_stack([null.general, _largest(null.z, testable)]))
+        count = min(_AT_ONCE if data.trace is None else _OF_TRACES_AT_ONCE, max(1, _VALUES // residual.size), (draws or study.draws) - drawn)
+        tables = tester.design.draw(rng, run_covariance, np.tile(observed.session_ratio[0], (count, 1)))
+        batches.append(nulls.statistics(tables, testable, rng))
         if drawn + count >= _FEWEST_DRAWS and skipped("more draws of some tests"):
             break
         if decide is not None and _decided(np.concatenate(batches), statistics, decide):

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import helmert
 
-from calibration.linear.memory import Memory, Series, estimate_memory
+from calibration.linear.memory import Memory, Repeats, estimate_memory
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.forward import derivatives
 from calibration.statistics.statistical_model import (
@@ -96,34 +96,32 @@ def whiten_traces(study: Study, start: dict[str, float]) -> tuple[Study, dict[st
     plain, used = study.model, study.split.fitted
     runs = plain.runs
     spread = (runs.y - plain.predict([start])[0])[used].var(0)
-    rough = np.diag(np.where(spread > 0, spread, 1.0))
-    model = with_runs(plain, noise_of_traces=(rough, float(used.sum())))
+    rough = np.where(spread > 0, spread, 1.0)
+    model = with_runs(plain, noise_known=False, sigma=np.sqrt(rough))
     names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
     first = fit(model, start, names, used, title="fit" if study.progress else "")
     # Repeats are compared with each other, not with the model, so those too take part that are held out.
-    series = list(_of_repeats(first, runs))
-    known = bool(series) and runs.noise_known
-    noise = estimate_memory(series or list(_of_traces(study, first, used)))
+    residual, repeats = runs.y - first.prediction, list(_repeats(first, runs))
+    known = bool(repeats) and runs.noise_known
+    noise = estimate_memory(repeats or list(_of_each_trace(study, first, used)), residual)
     assert runs.trace is not None
     assert runs.time is not None
     memory = Memory(runs.trace, runs.time, noise.share, noise.tau)
-    changes = {"noise_of_traces": (noise.run_covariance, noise.freedom), "noise_known": known, "sigma": None}
+    changes = {"noise_of_traces": noise, "noise_known": known, "sigma": None}
     inner: Any = with_runs(plain, **changes, states=_states(runs, first.prediction))
     return replace(study, model=Whitened(inner, memory)), first.parameters
 
 
-def _of_repeats(first: Fit, runs: Runs) -> Iterator[Series]:
-    """Yield the series of each set of repeated traces."""
-    residual, own = runs.y - first.prediction, _places_of_numbers(first)
+def _repeats(first: Fit, runs: Runs) -> Iterator[Repeats]:
+    """Yield each set of repeated traces."""
+    own = _places_of_numbers(first)
     for rows in _repeated(runs):  # (J, t)
         assert runs.time is not None
-        time = runs.time[rows].mean(0)
-        contrasts = np.tensordot(helmert(len(rows)), residual[rows], 1)  # (J - 1, t, k)
-        along = first.jacobian[rows]  # (J, t, k, p)
+        time, along = runs.time[rows].mean(0), first.jacobian[rows]  # (J, t, k, p)
         columns = [along[..., places].sum(-1).mean(0) for places in own.values()]  # (t, k) each
         absorbed = np.column_stack([np.ones(len(time)), *columns])
         if len(time) >= absorbed.shape[1] + _MORE:
-            yield Series(time, np.moveaxis(contrasts, 0, 1), absorbed)
+            yield Repeats(rows, helmert(len(rows)), time, absorbed)
 
 
 def _places_of_numbers(first: Fit) -> dict[str, list[int]]:
@@ -159,21 +157,20 @@ def _first_of_each(runs: Runs, rows: Flags, shared: set[int]) -> Integers:
     return np.asarray(places[np.sort(np.unique(runs.condition[places], return_index=True)[1])])
 
 
-def _of_traces(study: Study, first: Fit, used: Flags) -> Iterator[Series]:
-    """Yield a series for each trace: its residual, less what parameters and effects may change in it."""
+def _of_each_trace(study: Study, first: Fit, used: Flags) -> Iterator[Repeats]:
+    """Yield each trace alone; parameters and effects may change its residual to any amount."""
     runs = study.model.runs
     assert runs.trace is not None
     assert runs.time is not None
-    effects = derivatives(first.model, first.parameters, study.effects)[1] if study.effects else None
-    every = np.concatenate([first.jacobian, *([] if effects is None else [effects])], -1)
-    residual = runs.y - first.prediction
+    effects = derivatives(first.model, first.parameters, study.effects)[1]
+    every = np.concatenate([first.jacobian, effects], -1)
     for trace in np.unique(runs.trace[used]):
-        rows = used & (runs.trace == trace)
-        columns = np.column_stack([np.ones(rows.sum()), every[rows].reshape(rows.sum(), -1)])
+        rows = np.flatnonzero(used & (runs.trace == trace))
+        columns = np.column_stack([np.ones(len(rows)), every[rows].reshape(len(rows), -1)])
         columns = columns / np.maximum(np.abs(columns).max(0), 1e-300)
         vectors, sizes, _ = np.linalg.svd(columns, full_matrices=False)
-        seen = min(int((sizes > _SEEN * sizes[0]).sum()), int(_ABSORBED * rows.sum()))
-        yield Series(runs.time[rows], residual[rows][:, None], vectors[:, :seen])
+        seen = min(int((sizes > _SEEN * sizes[0]).sum()), int(_ABSORBED * len(rows)))
+        yield Repeats(rows[None], np.ones((1, 1)), runs.time[rows], vectors[:, :seen])
 
 
 def _states(runs: Runs, prediction: Floats) -> dict[str, Floats]:

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from calibration.linear.gls import repeat_count, repeat_covariance
-from calibration.linear.memory import Memory
+from calibration.linear.memory import Memory, NoiseOfTraces
 from calibration.table.excluded import Excluded, count_of_rows, summary_of_excluded
 from common.arrays import Flags, Floats, Integers
 
@@ -65,7 +65,7 @@ class Runs:
     time_name: str = "time"
     # Of the noise along traces. With it y is white along them, and so is what is predicted.
     memory: Memory | None = None
-    noise_of_traces: tuple[Floats, float] | None = None  # S and its degrees of freedom; see `statistics.traces`
+    noise_of_traces: NoiseOfTraces | None = None  # see `calibration.statistics.traces`
     heads: Flags | None = None  # (n,) see `left_out`
     states: Mapping[str, Floats] = field(default_factory=dict)  # (n,) of readings, beside the inputs
 
@@ -118,13 +118,13 @@ class Runs:
     def known_covariance(self) -> Floats | None:
         """S, (k, k), where it is not estimated from runs."""
         if self.noise_of_traces is not None:
-            return self.noise_of_traces[0]
+            return self.noise_of_traces.run_covariance
         return None if self.sigma is None else np.diag(self.sigma**2)
 
     def noise(self, rows: Flags) -> tuple[Floats, float]:
         """Estimate S (k, k) from the runs in `rows`, with its degrees of freedom, unless it is declared."""
         if self.noise_of_traces is not None:
-            return self.noise_of_traces
+            return self.noise_of_traces.run_covariance, self.noise_of_traces.freedom
         if self.sigma is not None:
             return np.diag(self.sigma**2), math.inf
         repeats = self.repeats(rows)
@@ -198,7 +198,7 @@ class Runs:
         """
         session, noted = self.session[rows], self.noted_of_repeats[rows]
         condition = self.repeat_ids[rows]
-        if self.trace is not None:  # their noise is not estimated from runs
+        if self.trace is not None:  # their noise is not estimated from rows
             return condition
         alone = self._alone(rows)
         differing = np.empty((len(condition), 0)) if self.differing is None else self.differing[rows]
