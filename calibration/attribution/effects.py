@@ -32,6 +32,7 @@ from calibration.statistics.study import Study
 
 FIRST = 3  # number of single effects to which a second one is added
 _DRAWS = 400  # of the bootstrap, for the residual that an effect leaves
+_MARGIN = 0.01  # share of the range of a number that is its end
 
 
 def scored(
@@ -155,7 +156,14 @@ def measures_of(study: Study, base: Fit, others: Directions) -> dict[str, Callab
 
 def coefficients_within_range(model: ForwardModel, fitted: Parameters) -> bool:
     """Tell whether no coefficient ran to an end of its range."""
-    return all(1.5 * p.bounds[0] < fitted[p.name] < p.bounds[1] / 1.5 for p in model.coefficients)
+    return all(low < fitted[p.name] < high for p in model.coefficients for low, high in [_within(p)])
+
+
+def _within(number: Parameter) -> tuple[float, float]:
+    """Return the range of a number less its ends."""
+    low, high = number.bounds
+    margin = _MARGIN * (high - low)
+    return (1.5 * low, high / 1.5) if number.logarithmic else (low + margin, high - margin)
 
 
 def pairs(study: Study, candidates: Sequence[Hypothesis]) -> list[Hypothesis]:

@@ -1,5 +1,7 @@
 """What left-out runs say: each is predicted from the other sessions, by one linear step, and gains are paired.
 
+Numbers that left-out runs have of their own are fitted to these runs, since no others know them.
+
 Two gains share the runs without either model, so their own standard errors say nothing about which one is larger.
 So two models are compared by the difference of the log likelihoods, paired over conditions: with C conditions of
 differences D_c,
@@ -13,6 +15,7 @@ C − 1 degrees of freedom: a few conditions prove little.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +25,7 @@ from calibration.linear.gls import Noise, solve_normal
 from calibration.statistics.fit import Fit
 from calibration.statistics.signed_ranks import signed_rank_p
 from calibration.statistics.study import Study, leave_one_group_out
-from common.arrays import Floats, Integers
+from common.arrays import Flags, Floats, Integers
 
 _QUANTILE = 0.975
 
@@ -87,8 +90,22 @@ def left_out_residual(study: Study, fitted: Fit, noise: Noise) -> Floats:
     for learn, out in leave_one_group_out(data, study.split.fitted):
         step = solve_normal(fitted.normal_of_fit(data, learn, noise))[0]
         predicted = (data.y - fitted.prediction)[out] - fitted.tangents[out] @ step
-        parts.append(noise.whitener(data.session[out], data.scale[out], data.along[out])(predicted))
+        whiten = noise.whitener(data.session[out], data.scale[out], data.along[out])
+        parts.append(_without_own_numbers(fitted, whiten(predicted), learn, out, whiten))
     return np.concatenate(parts)
+
+
+def _without_own_numbers(
+    fitted: Fit, white: Floats, learn: Flags, out: Flags, whiten: Callable[[Floats], Floats]
+) -> Floats:
+    """Take from a white residual of the runs `out` what numbers change of which other runs say nothing."""
+    own = [
+        place for place, p in enumerate(fitted.fitted) if p.of_group and not fitted.tangents[learn, :, place].any()
+    ]
+    if not own:
+        return white
+    basis = np.linalg.qr(whiten(fitted.tangents[out][..., own]))[0]
+    return np.asarray(white - basis @ (basis.T @ white))
 
 
 def left_out_rows(study: Study) -> Integers:

@@ -351,7 +351,9 @@ class NormalEquations:
                 )
             )
             session_ratio = np.clip(
-                (own + common) / 2 / (total - (self.sizes**2).sum() / total), 0.0, _MOST_SCATTER
+                (own + common) / 2 / max(total - float((self.sizes**2).sum()) / total, _NOTHING),
+                0.0,
+                _MOST_SCATTER,
             )
         return np.where(self.estimated, session_ratio, UNKNOWN_RATIO)
 

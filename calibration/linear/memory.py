@@ -14,7 +14,8 @@ innovations of a Kalman filter, each over its standard deviation.
 
 s and τ have the largest restricted likelihood of some series, with what is linear in them projected out
 (Patterson and Thompson 1971), and a prior of τ: normal in its logarithm, two standard deviations from half a step
-to a third of a trace. Source of the banded form: Rue and Held (2005), section 2.4.
+to the length of three traces. A longer memory is a level and a slope, which are absorbed or shared by all.
+Source of the banded form: Rue and Held (2005), section 2.4.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ _SHARES, _TIMES = (-6.0, -1.0, 0.0, 1.0, 3.0, 5.0), 5  # ln (s/(1 − s)) and va
 _LARGEST, _LONGEST = 9.0, 50.0  # of ln (s/(1 − s)), and of ln τ
 _STEP = 0.7  # of the lattice in both
 _FARTHEST, _MOST_POINTS = 5.0, 30  # −ln of the likelihood above its least one, and points, of the lattice
+_TRACES = 3.0  # lengths of a trace, the longest τ of the prior
 _CERTAIN = 3000  # degrees of freedom from which s and τ count as known
 
 
@@ -150,7 +152,7 @@ def estimate_memory(repeats: Sequence[Repeats], residual: Floats) -> NoiseOfTrac
     starts = [(s, x) for s in _SHARES for x in np.linspace(*prior.ends, _TIMES)]
     first = np.array(min(starts, key=lambda at: cost(np.array(at))))
     simplex = first + np.array([(0.0, 0.0), (_STEP, 0.0), (0.0, prior.spread / 2)])
-    settings = {"initial_simplex": simplex, "xatol": 1e-2, "fatol": 1e-3, "maxiter": 200}
+    settings: dict[str, Any] = {"initial_simplex": simplex, "xatol": 1e-2, "fatol": 1e-3, "maxiter": 200}
     best = minimize(cost, first, method="Nelder-Mead", options=settings)
     share, tau = _natural(best.x)
     run_covariance = _Likelihood(repeats, share, tau).costs(series)[1][0]
@@ -168,10 +170,10 @@ class _Prior(NamedTuple):
 
     @classmethod
     def of(cls, repeats: Sequence[Repeats]) -> _Prior:
-        """Place it between half a step and a third of a trace."""
+        """Place it between half a step and the length of three traces."""
         steps = np.concatenate([np.diff(one.time) for one in repeats])
         least = float(np.median(steps[steps > 0])) / 2
-        most = max(float(np.median([np.ptp(one.time) for one in repeats])) / 3, 4 * least)
+        most = max(_TRACES * float(np.median([np.ptp(one.time) for one in repeats])), 4 * least)
         return cls(math.log(least * most) / 2, math.log(most / least) / 4)
 
     @property

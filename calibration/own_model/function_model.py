@@ -19,7 +19,7 @@ from tqdm import tqdm
 
 from calibration.own_model.declared import Model
 from calibration.statistics.budget import count_predictions, spent, waiting
-from calibration.statistics.forward import secants
+from calibration.statistics.forward import by_differences, linear, secants
 from calibration.statistics.statistical_model import Parameter, Parameters, Predict
 from calibration.table.reader import within_half_a_turn
 from calibration.table.runs import Runs
@@ -154,16 +154,20 @@ class FunctionModel:
         for place, call in enumerate(self.calls):
             if place and spent():  # as if it were not solved, so that many calls end within one
                 break
-            given = {p.name: parameters.get(call.own.get(p.name, p.name), p.start) for p in self.model.parameters}
+            own = {name: parameters[of] for name, of in call.own.items() if of in parameters}
+            given = {name: parameters.get(name, start) for name, start in (self._starts | own).items()}
             prediction[call.rows] = self._called(place, call, given)
         return prediction
 
+    @cached_property
+    def _starts(self) -> dict[str, float]:
+        return {p.name: p.start for p in self.model.parameters}
+
     def _called(self, place: int, call: Call, values: Mapping[str, Any]) -> Floats:
-        """Predict the runs of a call (n', k): by one, or by one for each combination of values that differ in it."""
-        of_call = {name: value[call.rows] if np.ndim(value) else value for name, value in values.items()}
-        arrays = [name for name, value in of_call.items() if np.ndim(value)]
-        differing = [name for name in arrays if (of_call[name] != of_call[name][0]).any()]
-        plain = {**of_call, **{name: of_call[name][0].item() for name in arrays}}
+        """Predict the runs of a call (n', k), by one for each combination of values that differ in it."""
+        arrays = {name: value[call.rows] for name, value in values.items() if isinstance(value, np.ndarray)}
+        differing = [name for name, value in arrays.items() if (value != value[0]).any()]
+        plain = {**values, **{name: value[0].item() for name, value in arrays.items()}}
         if not differing:
             key = (place, *plain.values())
             if key not in self.known:
@@ -172,7 +176,7 @@ class FunctionModel:
             while len(self.known) > _KEPT * len(self.calls):
                 del self.known[next(iter(self.known))]
             return found
-        every = np.stack([of_call[name] for name in differing], 1)
+        every = np.stack([arrays[name] for name in differing], 1)
         kinds, kind = np.unique(every, axis=0, return_inverse=True)
         prediction = np.full((len(call.rows), self.runs.y.shape[1]), np.nan)
         for number, combination in enumerate(kinds.tolist()):
@@ -205,7 +209,38 @@ class FunctionModel:
         """Return the linear model, by differences."""
         if self.turns.any():  # no step of a derivative ends a turn away
             self = replace(self, about=self.predict([at])[0])
-        return secants(self, at, along, title=title)
+        own = [p for p in along if p.of_group]
+        if not own:
+            return secants(self, at, along, title=title)
+        # What all groups have of a number acts on different runs, so it is moved at once.
+        declared = {
+            n.name: n.parameter for n in self.model.numbers if n.name in {p.of_group[0] for p in own if p.of_group}
+        }
+        shared = [p for p in along if not p.of_group]
+        of_runs = {**at, **{name: self._of_runs(name, at) for name in declared}}
+        seen, slopes = by_differences(self, of_runs, [*shared, *declared.values()], title=title)
+        place_of = {p.name: place for place, p in enumerate([*shared, *declared.values()])}
+        columns = np.zeros((*seen.shape, len(along)))
+        for place, p in enumerate(along):
+            rows = slice(None) if p.of_group is None else self._rows_of[p.name]
+            columns[rows, :, place] = slopes[rows, :, place_of[p.of_group[0] if p.of_group else p.name]]
+        return linear(at, along, seen, columns)
+
+    def _of_runs(self, name: str, at: Parameters) -> Floats:
+        """Return what each run has of a number of groups, (n,)."""
+        values = np.empty(len(self.runs))
+        for call in self.calls:
+            values[call.rows] = at[call.own[name]]
+        return values
+
+    @cached_property
+    def _rows_of(self) -> dict[str, Integers]:
+        """The runs of each number of a group."""
+        rows: dict[str, list[Integers]] = {}
+        for call in self.calls:
+            for name in call.own.values():
+                rows.setdefault(name, []).append(call.rows)
+        return {name: np.concatenate(parts) for name, parts in rows.items()}
 
     def check(self, prediction: Floats) -> None:
         """Accept any prediction: `calibration.own_model.checks` has looked at it."""

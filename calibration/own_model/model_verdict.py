@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from calibration.own_model.declared import Model
 from calibration.verdict.verdict import Verdict
@@ -22,6 +23,13 @@ class ModelVerdict(Verdict):
     model: Model = field(kw_only=True)  # as it was given
 
     @property
-    def corrected(self) -> dict[str, float]:
-        """Numbers, and effects that are kept, fitted to all runs: name -> value."""
-        return {p.name: self.final_refit.parameters[p.name] for p in self.handed_on}
+    def corrected(self) -> dict[str, Any]:
+        """Numbers, and effects that are kept, fitted to all runs: name -> value, or group -> value of its own."""
+        corrected: dict[str, Any] = {}
+        for p in self.handed_on:
+            value = self.final_refit.parameters[p.name]
+            if p.of_group:
+                corrected.setdefault(p.of_group[0], {})[p.of_group[1]] = value
+            else:
+                corrected[p.name] = value
+        return corrected

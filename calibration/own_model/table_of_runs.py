@@ -11,7 +11,7 @@ import re
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -76,6 +76,8 @@ def read_runs_of(
         if (roles.trace is None) != (model.time is None):
             raise InputError("a table of traces needs the column of their names, trace=, and a model with time=")
         result = _read(table, model, roles._replace(session=session))
+        if len(result.runs.trace_names) == 1:
+            raise InputError("the table has one trace only, so none can be held out; give several, best repeats")
         caveats = check_function(result, title=title)
         held_out = _held_out(roles.held_out, result)
         if held_out is None and not middle_session(result.runs).any():

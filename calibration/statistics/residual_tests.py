@@ -294,6 +294,7 @@ class _Absorbed:
             tuple[Integers, Floats]
         ] = []  # rows of a trace among those used, and an orthonormal basis
         for trace in np.unique(data.trace[used]) if own and data.trace is not None else ():
+            assert data.trace is not None
             rows = np.flatnonzero(data.trace[used] == trace)
             columns = fitted.tangents[used][rows, 0][:, own]
             columns = columns[:, np.abs(columns).max(0) > 0]
@@ -386,7 +387,11 @@ def examine_residual(
     nulls = _Nulls(tester, data, used, fitted, directions.table)
     batches: list[Floats] = []
     while (drawn := sum(map(len, batches))) < (draws or study.draws):
-        count = min(_AT_ONCE if data.trace is None else _OF_TRACES_AT_ONCE, max(1, _VALUES // residual.size), (draws or study.draws) - drawn)
+        count = min(
+            _AT_ONCE if data.trace is None else _OF_TRACES_AT_ONCE,
+            max(1, _VALUES // residual.size),
+            (draws or study.draws) - drawn,
+        )
         tables = tester.design.draw(rng, run_covariance, np.tile(observed.session_ratio[0], (count, 1)))
         batches.append(nulls.statistics(tables, testable, rng))
         if drawn + count >= _FEWEST_DRAWS and skipped("more draws of some tests"):

@@ -157,8 +157,7 @@ def leave_one_group_out(data: Runs, used: Flags) -> Iterator[tuple[Flags, Flags]
     """Yield the runs (n,) to learn from and the runs (n,) left out, for every group among those in `used`."""
     group = groups(data)[0]
     for label in np.unique(group[used]):
-        if (out := data.left_out(used & (group == label))).any():
-            yield used & ~out, out
+        yield used & (group != label), used & (group == label)
 
 
 def divided(data: Runs, held_out: Flags) -> bool:

@@ -1,7 +1,7 @@
 """Runs that are readings of traces: the noise along a trace, and a model whose runs and predictions are white.
 
-**Noise.** Readings of a trace have the covariance S ⊗ R (`calibration.linear.memory`). S, s and τ come from repeated
-traces: what these share is no noise, so a missing effect does not hide in R. With J traces of equal
+**Noise.** Readings of a trace have the covariance S ⊗ R (`calibration.linear.memory`). S, s and τ come from
+repeated traces: what these share is no noise, so a missing effect does not hide in R. With J traces of equal
 settings, at the times that all of them have, the residuals r_j of a first fit give J − 1 series
 
     d_c = Σ_j h_cj r_j,   h orthonormal, each row with the sum 0,
@@ -10,8 +10,8 @@ in which the model's misfit cancels. A number that each trace, session or specim
 its derivative, and so is a level. Without repeats S, s and τ come from what all parameters and effects leave of
 each trace. This may contain what the model lacks, so the noise counts as unknown.
 
-**White runs.** `Whitened` multiplies what was measured and what is predicted by L⁻¹, R = L Lᵀ, trace by trace. Fits,
-tests and bootstrap see rows that are white but for S and the scatter of sessions, and know of no traces.
+**White runs.** `Whitened` multiplies what was measured and what is predicted by L⁻¹, R = L Lᵀ, trace by trace.
+Fits, tests and bootstrap see rows that are white but for S and the scatter of sessions, and know of no traces.
 """
 
 from __future__ import annotations
@@ -27,12 +27,10 @@ from calibration.linear.memory import Memory, Repeats, estimate_memory
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.forward import derivatives
 from calibration.statistics.statistical_model import (
-    Experiment,
     Parameter,
     Parameters,
     Predict,
     Wrapped,
-    start_values,
     with_runs,
 )
 from calibration.statistics.study import Study
@@ -177,7 +175,7 @@ def _states(runs: Runs, prediction: Floats) -> dict[str, Floats]:
     """Name what a residual may depend on beside settings and time: each output, and its rate of change."""
     assert runs.trace is not None
     assert runs.time is not None
-    states = {}
+    states: dict[str, Floats] = {}
     for place, name in enumerate(runs.outputs):
         values, rate = prediction[:, place], np.zeros(len(runs))
         for trace in np.unique(runs.trace):

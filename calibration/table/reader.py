@@ -180,11 +180,13 @@ class TableReader:
 
     def _traces(self, was_set: Floats) -> dict[str, Any]:
         """Check the traces, set aside those that cannot be used, and make their fields of `Runs`."""
-        column, time = self.declared.trace, self.columns[self.declared.time]
+        column = self.declared.trace
         assert column is not None
+        assert self.declared.time is not None
+        time = self.columns[self.declared.time]
         first: dict[bytes, str] = {}
         for rows in self._rows_of_traces():
-            name = f"trace {self.columns[column][rows[0]]}"
+            name = f"trace {str(self.columns[column][rows[0]]).removesuffix('.0')!r}"
             if (back := np.flatnonzero(np.diff(time[rows]) < 0)).size:
                 at = row_name(self.table, int(rows[back[0] + 1]))
                 raise InputError(
@@ -204,11 +206,13 @@ class TableReader:
     @property
     def of_first_trace(self) -> Flags:
         """The rows of the trace of the first faultless row, (n,)."""
+        assert self.declared.trace is not None
         names = self.columns[self.declared.trace]
         return np.asarray(names == names[int(np.argmax(self.faultless))])
 
     def _rows_of_traces(self) -> list[Integers]:
         """List the faultless rows of each trace."""
+        assert self.declared.trace is not None
         rows = np.flatnonzero(self.faultless)
         number = np.unique(self.columns[self.declared.trace][rows], return_inverse=True)[1].reshape(-1)
         return np.split(rows[np.argsort(number, kind="stable")], np.cumsum(np.bincount(number))[:-1])

@@ -287,7 +287,7 @@ class Runs:
         """Choose the runs in `rows`: flags (n,), or places."""
         of_runs = {k: v for k, v in vars(self).items() if isinstance(v, np.ndarray) and k != "sigma"}
         arrays: dict[str, Any] = {k: v[rows] for k, v in of_runs.items()}
-        of_names = {
+        of_names: dict[str, Any] = {
             key: {name: values[rows] for name, values in getattr(self, key).items()} for key in ("notes", "states")
         }
         return replace(self, **arrays, **of_names)
