@@ -153,7 +153,7 @@ def estimate_memory(repeats: Sequence[Repeats], residual: Floats) -> NoiseOfTrac
     first = np.array(min(starts, key=lambda at: cost(np.array(at))))
     simplex = first + np.array([(0.0, 0.0), (_STEP, 0.0), (0.0, prior.spread / 2)])
     settings: dict[str, Any] = {"initial_simplex": simplex, "xatol": 1e-2, "fatol": 1e-3, "maxiter": 200}
-    best = minimize(cost, first, method="Nelder-Mead", options=settings)
+    best = minimize(cost, first, method="Nelder-Mead", options=settings)  # type: ignore[call-overload]
     share, tau = _natural(best.x)
     run_covariance = _Likelihood(repeats, share, tau).costs(series)[1][0]
     freedom = sum(one.contrasts.shape[0] * (len(one.time) - one.absorbed.shape[1]) for one in repeats)
