@@ -17,7 +17,7 @@ from calibration.attribution.rules import UNSEEN, refuting, shift_of
 from calibration.attribution.wrong_numbers import notable_pull
 from calibration.findings.findings import Findings
 from calibration.linear.gls import inverse_root
-from calibration.statistics.fit import Fit, Pull, least_determined
+from calibration.statistics.fit import Fit, Pull, is_free_logarithm, least_determined
 from calibration.statistics.statistical_model import Parameter
 from calibration.table.between_repeats import Difference
 from calibration.table.excluded import count_of_rows
@@ -71,11 +71,18 @@ def corrected_record(result: Findings) -> dict[str, Any]:
         half = _NORMAL * math.sqrt(refit.covariance[index, index])
         value = refit.parameters[parameter.name]
         alone = [float(parameter.changed(value, end)) for end in (-half, half)]
-        values["effects" if parameter.name in effects else "numbers"][parameter.name] = {
+        interval = list(result.final_intervals.get(parameter.name, alone))
+        kind = values["effects" if parameter.name in effects else "numbers"]
+        if parameter.of_group:
+            number, group = parameter.of_group
+            of_number = kind.setdefault(number, {"unit": parameter.unit, "of": {}})
+            of_number["of"][group] = {"value": value, "interval": interval}
+            continue
+        kind[parameter.name] = {
             "title": parameter.title,
             "unit": parameter.unit,
             "value": value,
-            "interval": list(result.final_intervals.get(parameter.name, alone)),
+            "interval": interval,
             "given": parameter.start,
             "scale": "logarithm" if parameter.logarithmic else "as it is",
         }
@@ -103,20 +110,28 @@ def _fitted(result: Findings) -> dict[str, Any]:
     final, refit = result.final, result.final_refit.parameters
     fitted = {p.name: p for p in (*result.base.fitted, *final.fitted)}
     intervals = result.final_intervals
+    values = {
+        name: {
+            **shown(fitted[name]),
+            "value": final.parameters[name],
+            "interval": list(intervals[name]),
+            "value_all_runs": refit[name],
+        }
+        for name in final.names
+        if name in refit
+    }
+    own = {name: of.of_group for name, of in fitted.items() if of.of_group}
+    of_groups: dict[str, dict[str, Any]] = {}
+    for name, (number, group) in own.items():
+        if name in values:
+            of_groups.setdefault(number, {})[group] = values.pop(name)
     return {
-        "parameters": {
-            name: {
-                **shown(fitted[name]),
-                "value": final.parameters[name],
-                "interval": list(intervals[name]),
-                "value_all_runs": refit[name],
-            }
-            for name in final.names
-            if name in refit
-        },
+        "parameters": values,
+        "numbers_of_groups": of_groups,
         "parameters_without_effects": {
             name: {"value": result.base.parameters[name], "interval": list(interval)}
             for name, interval in result.base_intervals.items()
+            if name not in own
         },
         "least_determined": _least_determined(final),
         "subject": result.runs.subject,
@@ -125,7 +140,7 @@ def _fitted(result: Findings) -> dict[str, Any]:
 
 def _least_determined(final: Fit) -> dict[str, Any] | None:
     """Write the direction in the coefficients that the runs determine worst, and its standard deviation."""
-    if not any(p.logarithmic and p.sigma is None for p in final.fitted):
+    if not any(map(is_free_logarithm, final.fitted)):
         return None
     direction, error = least_determined(final)
     return {"direction": direction, "error": error}
@@ -195,6 +210,7 @@ def _adopted(form: Hypothesis, alike: Sequence[Hypothesis], runs: Runs) -> dict[
         "spread": evidence.spread,
         "scale": "logarithm" if form.logarithmic else "as it is",
         "sizes": {name: list(size) for name, size in evidence.sizes.items()},
+        "sizes_of": "specimens" if runs.trace is None or runs.specimen is not None else "sessions of traces",
         "removed_share": min(evidence.removed or 0.0, 1.0),
         "session_gain": [evidence.paired.gain, evidence.paired.error],
         "birge": evidence.birge,
@@ -343,10 +359,11 @@ def _largest_departures(result: Findings) -> list[dict[str, Any]]:
         runs.scale[:, None] * (runs.y - result.base.prediction) @ inverse_root(result.base.noise.run_covariance).T
     )
     departures: dict[tuple[str, ...], float] = {}
-    for condition in np.unique(runs.condition[used]):
-        rows = used & (runs.condition == condition)
+    for together in np.unique(runs.together[used]):
+        rows = used & (runs.together == together)
         mean = white[rows].sum(0) / math.sqrt(rows.sum())
-        at = tuple(f"{name} = {v[rows][0]:.4g}{unit}" for name, (v, unit) in runs.settings.items())
+        settings = {name: of for name, of in runs.settings.items() if name != runs.time_name or runs.trace is None}
+        at = tuple(f"{name} = {v[rows][0]:.4g}{unit}" for name, (v, unit) in settings.items())
         departures[at] = max(departures.get(at, 0.0), float(np.sqrt((mean**2).mean())))
     ranked = sorted(departures.items(), key=lambda item: -item[1])[:_REPEATED]
     return [{"at": list(at), "departure": departure} for at, departure in ranked]

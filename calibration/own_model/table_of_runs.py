@@ -188,7 +188,7 @@ def _advice(model: FunctionModel, roles: Roles) -> list[str]:
     free = [name for name in alike if 1 < table[name].nunique() <= len(table) / 2]
     if roles.session is None and len(runs.session_names) == 1 and free:
         advice.append(f"no session was given; column {free[0]} looks like one (--session {free[0]})")
-    if runs.repeated(slice(None)) or runs.sigma is not None or not runs.noise_known:
+    if runs.trace is not None or runs.repeated(slice(None)) or runs.sigma is not None or not runs.noise_known:
         return advice
     advice.append('without repeats the noise is unknown; declare it: sigma="2 %" of the Output, or noise=')
     for role in ("specimen", "session"):

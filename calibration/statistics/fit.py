@@ -600,13 +600,13 @@ def profile_intervals(
     model: ForwardModel, fitted: Fit, used: Flags, *, title: str = ""
 ) -> dict[str, tuple[float, float]]:
     """Compute the 95 % interval of every fitted parameter, by its profile deviance; by the covariance of nuisance
-    parameters and of what is held at a bound.
+    parameters, of numbers of a group's own, and of what is held at a bound.
     """
     data, count = model.runs, len(fitted.names)
     along = solve_normal(fitted.normal_of_fit(data, used))[1]
     sets, ends = [], []
     for i, p in enumerate(fitted.fitted):
-        if p.sigma is not None or fitted.held[i]:
+        if p.sigma is not None or p.of_group or fitted.held[i]:
             continue
         half = fitted.half_width(i)
         for side in (-1, 1):
@@ -668,13 +668,18 @@ def _deviance(fitted: Fit, data: Runs, used: Flags, others: list[int]) -> float:
     return float(schur_complement(normal, len(others))[0, 0])
 
 
+def is_free_logarithm(parameter: Parameter) -> bool:
+    """Tell whether all runs share a number that is fitted as its logarithm, without a prior."""
+    return parameter.logarithmic and parameter.sigma is None and not parameter.of_group
+
+
 def least_determined(fitted: Fit) -> tuple[dict[str, float], float]:
     """Find the direction in the coefficients, as logarithms, that the runs determine worst.
 
     Returns:
         The direction, a unit vector by name, largest component positive; and the standard deviation along it.
     """
-    places = [i for i, p in enumerate(fitted.fitted) if p.logarithmic and p.sigma is None]
+    places = [i for i, p in enumerate(fitted.fitted) if is_free_logarithm(p)]
     values, vectors = np.linalg.eigh(fitted.covariance[np.ix_(places, places)])
     vector = vectors[:, -1] * np.sign(vectors[np.argmax(np.abs(vectors[:, -1])), -1])
     direction = {fitted.fitted[i].name: part for i, part in zip(places, vector.tolist(), strict=True)}

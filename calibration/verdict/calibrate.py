@@ -37,7 +37,14 @@ from calibration.findings.held_out import HeldOutErrors, held_out_errors
 from calibration.findings.next_runs import Explanation, next_runs
 from calibration.statistics.budget import Work, beginning, limited, skipped
 from calibration.statistics.checks import predict_as_given
-from calibration.statistics.fit import Fit, UnsolvedError, birge, profile_end, profile_intervals
+from calibration.statistics.fit import (
+    Fit,
+    UnsolvedError,
+    birge,
+    is_free_logarithm,
+    profile_end,
+    profile_intervals,
+)
 from calibration.statistics.offsets import Offsets, with_differences
 from calibration.statistics.statistical_model import Experiment, ForwardModel, start_values, with_runs
 from calibration.statistics.study import (
@@ -309,10 +316,15 @@ def _caveats(findings: Findings, model: ForwardModel, ended: Mapping[str, str], 
     vague = [
         p.name
         for index, p in enumerate(final.fitted)
-        if p.logarithmic and p.sigma is None and final.half_width(index) > math.log(2) and p not in held
+        if is_free_logarithm(p) and final.half_width(index) > math.log(2) and p not in held
     ]
     outside = not coefficients_within_range(model, base.parameters)
     unknown = "there are neither repeats nor a declared noise, so no residual can be told from noise"
+    if runs.trace is not None:
+        unknown = (
+            "no two traces have the same settings and times, so the memory of the noise is unknown, and no "
+            "residual can be told from it"
+        )
     of_fits = (
         (not runs.noise_known, unknown),
         (beside, f"no law was looked for: laws are not fitted beside {beside}"),
