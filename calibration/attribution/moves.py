@@ -52,9 +52,7 @@ def groups_that_may_differ(runs: Runs) -> list[tuple[str, Flags]]:
     if runs.specimen is not None:
         candidates += [(f"on specimen {name}", runs.specimen == i) for i, name in enumerate(runs.specimen_names)]
     present = np.unique(session).tolist()  # a part of the runs may have none of a session
-    if runs.trace is not None and len(present) == len(
-        np.unique(runs.trace)
-    ):  # a trace may have numbers of its own
+    if runs.traces_are_sessions:  # a trace may have numbers of its own
         present = []
     candidates += [(f"in session {names[i]}", session == i) for i in present]
     by_time = sorted(present, key=lambda i: int(runs.rows[session == i].min()))

@@ -74,7 +74,7 @@ class Memory:
         flat = table.reshape(len(table), -1)
         steps = diagonal[:, None] * flat
         steps[1:] -= below[1:, None] * flat[:-1]
-        return np.asarray(dtbtrs(self._cholesky, steps, uplo="L")[0].reshape(table.shape))
+        return _solved(self._cholesky, steps).reshape(table.shape)
 
     def colour(self, table: Floats) -> Floats:
         """Compute L of a table (n, …) along its first axis."""
@@ -83,7 +83,7 @@ class Memory:
         mixed = self._cholesky[0][:, None] * flat
         mixed[1:] += self._cholesky[1, :-1, None] * flat[:-1]
         band = np.stack([diagonal, np.append(-below[1:], 0.0)])
-        return np.asarray(dtbtrs(band, mixed, uplo="L")[0].reshape(table.shape))
+        return _solved(band, mixed).reshape(table.shape)
 
     @cached_property
     def level(self) -> Floats:
@@ -94,6 +94,11 @@ class Memory:
     def log_determinant(self) -> float:
         """Compute ln |R|."""
         return float(2 * (np.log(self._cholesky[0]).sum() - np.log(self._bidiagonal[0]).sum()))
+
+
+def _solved(band: Floats, right: Floats) -> Floats:
+    """Solve a lower bidiagonal system; LAPACK must not be given a right side without columns."""
+    return np.asarray(dtbtrs(band, right, uplo="L")[0]) if right.size else right
 
 
 class Repeats(NamedTuple):

@@ -82,14 +82,19 @@ def _inseparable(model: FunctionModel, changes: dict[str, Floats]) -> list[tuple
     They do so at the start and elsewhere; `changes` are those of larger steps, which tell what need not be tried.
     """
     start, free = start_values(model), [n.parameter for n in model.model.numbers if n.sigma is None]
-    elsewhere = [model.everywhere(p.name, _changed(p)) for p in free]
-    points = start, {**start, **{name: value for changed in elsewhere for name, value in changed.items()}}
+    points = start, {**start, **{name: value for p in free for name, value in _elsewhere(model, p).items()}}
     return [
         (p, q)
         for p, q in (*combinations(free, 2), *product(free, model.effects))
         if _in_proportion(changes[p.name], changes[q.name], _ROUGHLY)
         and all(_in_proportion(_slope_along(model, at, p), _slope_along(model, at, q)) for at in points)
     ]
+
+
+def _elsewhere(model: FunctionModel, number: Parameter) -> dict[str, float]:
+    """Change a number; what groups have of it by amounts that differ."""
+    names, step = list(model.everywhere(number.name, 0.0)), _changed(number) - number.start
+    return {name: number.start + step * (place + 1) / len(names) for place, name in enumerate(names)}
 
 
 def _slope_along(model: FunctionModel, at: dict[str, float], of: Parameter) -> Floats:

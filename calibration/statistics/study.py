@@ -218,6 +218,8 @@ def far_readings(data: Runs, residual: Floats) -> list[str]:
             rest = np.abs(centred[rows] if len(rows) >= _GROUP else centred)
             limit[rows] = _POINTED * _MAD * np.nanmedian(rest) * (1 + 4 / len(rest))
         far = np.flatnonzero(np.abs(centred) > np.maximum(limit, 1e-12))
+        if data.trace is not None:  # of readings one after the other the first
+            far = far[np.diff(far, prepend=-2) > 1]
         if len(far) <= max(1, _SINGLE * len(data)) and np.isfinite(centred).sum() >= _GROUP:
             words = "{}: {} is {:.0f} times as far from the model as the rest of {} scatters"
             found += [

@@ -7,8 +7,10 @@ settings, at the times that all of them have, the residuals r_j of a first fit g
     d_c = Σ_j h_cj r_j,   h orthonormal, each row with the sum 0,
 
 in which the model's misfit cancels. A number that each trace, session or specimen has of its own is absorbed along
-its derivative, and so is a level. Without repeats S, s and τ come from what all parameters and effects leave of
-each trace. This may contain what the model lacks, so the noise counts as unknown.
+its derivative. A level of a session is scatter of sessions, and no memory: where each trace is a session it is
+absorbed, too; otherwise the mean of each session is taken from the residuals. Without repeats S, s and τ come from
+what all parameters and effects leave of each trace. This may contain what the model lacks, so the noise counts as
+unknown.
 
 **White runs.** `Whitened` multiplies what was measured and what is predicted by L⁻¹, R = L Lᵀ, trace by trace.
 Fits, tests and bootstrap see rows that are white but for S and the scatter of sessions, and know of no traces.
@@ -23,6 +25,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import helmert
 
+from calibration.linear.gls import averaging_rows
 from calibration.linear.memory import Memory, Repeats, estimate_memory
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.forward import derivatives
@@ -99,7 +102,7 @@ def whiten_traces(study: Study, start: dict[str, float]) -> tuple[Study, dict[st
     names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
     first = fit(model, start, names, used, title="fit" if study.progress else "")
     # Repeats are compared with each other, not with the model, so those too take part that are held out.
-    residual, repeats = runs.y - first.prediction, list(_repeats(first, runs))
+    residual, repeats = _without_sessions(runs, runs.y - first.prediction), list(_repeats(first, runs))
     known = bool(repeats) and runs.noise_known
     noise = estimate_memory(repeats or list(_of_each_trace(study, first, used)), residual)
     assert runs.trace is not None
@@ -117,9 +120,18 @@ def _repeats(first: Fit, runs: Runs) -> Iterator[Repeats]:
         assert runs.time is not None
         time, along = runs.time[rows].mean(0), first.jacobian[rows]  # (J, t, k, p)
         columns = [along[..., places].sum(-1).mean(0) for places in own.values()]  # (t, k) each
-        absorbed = np.column_stack([np.ones(len(time)), *columns])
+        level = np.ones((len(time), int(runs.traces_are_sessions)))
+        absorbed = np.column_stack([level, *columns])
         if len(time) >= absorbed.shape[1] + _MORE:
             yield Repeats(rows, helmert(len(rows)), time, absorbed)
+
+
+def _without_sessions(runs: Runs, residual: Floats) -> Floats:
+    """Take the mean of each session from a residual (n, k), where sessions have several traces."""
+    if runs.traces_are_sessions:
+        return residual
+    picks, sizes = averaging_rows(runs.session)
+    return residual - ((picks @ residual) / np.sqrt(sizes)[:, None])[runs.session]
 
 
 def _places_of_numbers(first: Fit) -> dict[str, list[int]]:

@@ -211,11 +211,12 @@ class TableReader:
         return np.asarray(names == names[int(np.argmax(self.faultless))])
 
     def _rows_of_traces(self) -> list[Integers]:
-        """List the faultless rows of each trace."""
+        """List the faultless rows of each trace, in the order of their first rows."""
         assert self.declared.trace is not None
         rows = np.flatnonzero(self.faultless)
         number = np.unique(self.columns[self.declared.trace][rows], return_inverse=True)[1].reshape(-1)
-        return np.split(rows[np.argsort(number, kind="stable")], np.cumsum(np.bincount(number))[:-1])
+        traces = np.split(rows[np.argsort(number, kind="stable")], np.cumsum(np.bincount(number))[:-1])
+        return sorted(traces, key=lambda rows: int(rows[0]))
 
     def _compared(self, name: str, usable: Flags, condition: Integers) -> pd.Series:
         """Return an output of the usable rows as it is compared, (n',)."""

@@ -115,6 +115,11 @@ class Runs:
         return np.asarray(self.trace * _BLOCKS + place * _BLOCKS // np.repeat(count, count))
 
     @property
+    def traces_are_sessions(self) -> bool:
+        """Whether no session has two traces."""
+        return self.trace is not None and len(np.unique(self.trace)) == len(np.unique(self.session))
+
+    @property
     def known_covariance(self) -> Floats | None:
         """S, (k, k), where it is not estimated from runs."""
         if self.noise_of_traces is not None:

@@ -16,7 +16,7 @@ from calibration.linear.gls import (
     schur_complement,
     solve_normal,
 )
-from calibration.statistics.residual_tests import TESTABLE, Directions, _kernel, directions, examine_residual
+from calibration.statistics.residual_tests import TESTABLE, Directions, directions, examine_residual, kernel_factor
 from calibration.statistics.statistical_model import precisions, prior_offsets
 from calibration.statistics.study import Study, middle_session
 from calibration.table.runs import features
@@ -142,10 +142,17 @@ def test_the_kernel_of_repeats_is_that_of_all_runs() -> None:
     white = rng.normal(size=(4, 200, 5))
     distance = ((inputs[:, None] - inputs[None]) ** 2).sum(-1)
     expected = np.einsum("bnk,nm,bmk->b", white, np.exp(-distance / 2), white)
-    places, kernel = _kernel(inputs)
-    assert places.shape == (20, 200)
-    added = places @ white
-    assert np.einsum("bik,ij,bjk->b", added, kernel, added) == pytest.approx(expected, rel=1e-12)
+    factor = kernel_factor(inputs)
+    assert factor.shape == (200, 20)
+    assert ((factor.T @ white) ** 2).sum((1, 2)) == pytest.approx(expected, rel=1e-10)
+
+
+def test_the_kernel_of_many_inputs_is_nearly_that_of_all() -> None:
+    inputs = np.random.default_rng(0).uniform(-2, 2, (1500, 2))
+    factor = kernel_factor(inputs)
+    distance = ((inputs[:, None] - inputs[None]) ** 2).sum(-1)
+    assert factor.shape[1] < 100
+    assert np.abs(factor @ factor.T - np.exp(-distance / 2)).max() < 0.1
 
 
 def test_lengths_are_those_of_a_dense_covariance() -> None:

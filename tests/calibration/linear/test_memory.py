@@ -24,6 +24,7 @@ def test_whitening_is_that_of_the_cholesky_factor(share):
     solved = np.linalg.solve(root, table.reshape(21, -1)).reshape(table.shape)
     assert_allclose(memory.whiten(table), solved, rtol=1e-6, atol=1e-8)
     assert_allclose(memory.colour(memory.whiten(table)), table, rtol=1e-10)
+    assert memory.whiten(table[..., :0]).shape == memory.colour(table[..., :0]).shape == (21, 2, 0)
     assert_allclose(memory.log_determinant, 2 * np.log(np.diag(root)).sum(), rtol=1e-6, atol=1e-8)
     assert_allclose(memory.level, np.linalg.solve(root, np.ones(21)), rtol=1e-6)
 

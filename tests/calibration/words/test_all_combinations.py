@@ -36,6 +36,7 @@ NEAREST = {
     "effect": "wall", "title": "wall of the tube", **SHOWN, "mean": 0.9, "interval": [0.8, 1.0], "spread": 0.1,
     "sizes": {}, "removed_share": 0.9, "session_gain": [30.0, 4.0], "birge": 2.0, "remainder": 0.01,
     "remainder_p": 0.002, "largest_along": "speed along depth", "as_well": ["inertia"], "at_theory": False,
+    "sizes_of": "specimens",
 }  # fmt: skip
 SIZES = {"A": [0.7, 0.6, 0.8], "B": [1.1, 1.0, 1.2]}
 OFF = {"title": "viscosity", "words": "viscosity is 9 % above what was given (9.1 σ)", "departure": "9 % above",

@@ -46,7 +46,7 @@ UNEXPLAINED = {"verdict": "unexplained", "p_value": 0.001, "held_out_error_falls
 SPREAD = {
     "effect": "wall", "title": "a wall", "unit": "1", "shown": 1.0, "mean": 2.0, "interval": [1.0, 3.0],
     "sizes": {"A": [1.5, 1.0, 2.0], "B": [9.0, 8.0, 10.0]}, "removed_share": 0.999, "remainder": 0.0,
-    "largest_along": "", "as_well": ["drag", "a current"], "at_theory": False,
+    "sizes_of": "specimens", "largest_along": "", "as_well": ["drag", "a current"], "at_theory": False,
 }  # fmt: skip
 PARTIAL = {"verdict": "partial", "nearest": SPREAD, "held_out_error_falls": True}
 
