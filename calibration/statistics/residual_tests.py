@@ -63,7 +63,7 @@ _PASSES_OF_A_SCORE = 2
 _AT_ONCE, _OF_TRACES_AT_ONCE = 50, 200  # draws
 _FEWEST_DRAWS = 100  # where no time is left
 _MOST_PLACES, _LANDMARKS = 1000, 200  # distinct inputs between which a kernel is computed, and those of more
-_SEEN = 1e-2  # share of the largest eigenvalue of the kernel between these that counts
+_SEEN = 3e-3  # share of the largest eigenvalue of the kernel between these that counts
 _VALUES = 2_000_000  # of the draws that are made at once
 
 

@@ -173,7 +173,7 @@ def test_tables_of_traces_that_cannot_be_used():
     assert "trace 'cup 0 of day 0' goes back in time in row 5" in fault(back)
     assert "one trace only" in fault(table[table["cup"] == "cup 0 of day 0"])
     assert "needs the column of their names, trace=" in fault(table, trace=None)
-    with pytest.raises(InputError, match="needs the column of the time: sf.Model"):
+    with pytest.raises(InputError, match=r"needs the column of the time: sf\.Model"):
         replace(MODEL, time=None)
     with pytest.raises(InputError, match="per 'cup'; give one of trace, session, specimen"):
         sf.Number("start", 1.0, per="cup")
