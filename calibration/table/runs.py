@@ -57,6 +57,10 @@ class Runs:
     output_scales: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     unit_checked: Mapping[str, bool] = field(default_factory=dict)  # outputs of which it may be declared
     differing: Floats | None = None  # (n, c) by which repeats were found to differ
+    trace: Integers | None = None  # (n,) 0, 1, …: time series of which rows are readings; None: there are none
+    trace_names: tuple[str, ...] = ()  # by number
+    time: Floats | None = None  # (n,) of the rows of traces
+    time_name: str = "time"  # of its column
 
     @property
     def scale(self) -> Floats:
