@@ -64,8 +64,8 @@ def differences_of_traces(runs: Runs, *, level: float) -> tuple[Difference, ...]
 
     Returns:
         At most one for each trace; its `kind` is "saturation", "drift", "clock" or "step". The `size` is on the
-        scale of y: by how much the repeats go on, the trace parts from them from begin to end, or it steps. That
-        of a clock is β.
+        scale of y: by how much the repeats go on, the trace has parted from them at its end, or it steps. That of
+        a clock is β.
     """
     level *= SHARE_OF_LEVEL
     outputs, good, found = range(len(runs.outputs)), np.ones(len(runs.trace_names), dtype=bool), []
@@ -184,7 +184,7 @@ def _difference(runs: Runs, group: _Group, j: int, s: int, F: float, p: float, a
     """Say what a trace differs by, with the shapes that fit it as well; of two repeats it may be the other one."""
     m, shape, kinds = len(group.traces), group.shapes[:, s], ("drift", "clock", "step")
     fitted = np.linalg.lstsq(np.column_stack([group.own, shape]), group.y[j], rcond=None)[0]
-    where = ("from its begin to its end", "all the time", f"at {_at(runs, group.time[np.argmax(shape)])}")
+    where = ("from its beginning to its end", "all the time", f"at {_at(runs, group.time[np.argmax(shape)])}")
     name, against = runs.trace_names[group.traces[j]], runs.trace_names[group.traces[1 - j]] if m == 2 else ""
     of = runs.outputs[group.output], name, where[min(s, 2)], float(fitted[-1]) * m / (m - 1), float(np.sqrt(F)), p
     others = {kinds[min(i, 2)] for i in alike.tolist()} - {kinds[min(s, 2)]}
