@@ -61,6 +61,7 @@ class Runs:
     trace_names: tuple[str, ...] = ()  # by number
     time: Floats | None = None  # (n,) of the rows of traces
     time_name: str = "time"  # of its column
+    heads: Flags | None = None  # (n,) beginnings of traces, to which numbers of their own are fitted when held out
 
     @property
     def scale(self) -> Floats:
@@ -69,6 +70,10 @@ class Runs:
 
     def __len__(self) -> int:
         return len(self.y)
+
+    def raw(self, table: Floats) -> Floats:
+        """Return a table (n, …) on the scale of what was read."""
+        return table
 
     def noise(self, rows: Flags) -> tuple[Floats, float]:
         """Estimate S (k, k) from the runs in `rows`, with its degrees of freedom, unless it is declared."""
