@@ -175,8 +175,9 @@ def draw_curves(result: Findings) -> list[tuple[Figure, str]]:
 def _draw_curves(result: Findings, k: int) -> Figure:
     """Draw the curves of an output."""
     data, (factor, unit) = result.runs, result.runs.scale_of(result.runs.outputs[k])
-    measured, models = data.raw(data.y)[:, k], [(name, data.raw(p)[:, k]) for name, p in compared(result)]
-    held_out, fitted = _ranked(result, measured - models[-1][1]), result.split.fitted
+    measured = np.where(data.gaps[:, k], np.nan, data.raw(data.y)[:, k])
+    models = [(name, data.raw(prediction)[:, k]) for name, prediction in compared(result)]
+    held_out = _ranked(result, measured - models[-1][1])
     heights = [*(1.25 for _ in held_out), *(0.9 for _ in models)]
     assert data.trace is not None
     assert data.time is not None
@@ -185,23 +186,23 @@ def _draw_curves(result: Findings, k: int) -> Figure:
     curves, residuals = panels[: len(held_out)], panels[len(held_out) :]
     band = 2 * float(np.sqrt(result.final.noise.run_covariance[k, k])) if data.noise_known else 0.0
     for axes, (rows, words) in zip(curves, held_out, strict=True):
-        _draw_trace(
-            axes, data, rows, [(name, curve) for name, curve in [("measured", measured), *models]], k, band
-        )
+        _draw_trace(axes, data, rows, [("measured", measured), *models], k, band)
         axes.set_title(words, fontsize=8, loc="left", pad=3, parse_math=False)
     for axes, (name, curve), colour in zip(residuals, models, (ORANGE, GREEN), strict=False):
-        for trace in np.unique(data.trace[fitted]):
-            rows = fitted & (data.trace == trace)
+        for trace in np.setdiff1d(data.trace[result.split.fitted], data.trace[result.split.test]):
+            rows = data.trace == trace
             axes.plot(data.time[rows], factor * (measured - curve)[rows], color=colour, lw=0.6, alpha=0.7)
         axes.axhline(0, color=INK, lw=0.6)
         axes.set_title(f"measured − {name}", fontsize=8, loc="left", pad=3)
-        axes.set_ylabel(f"[{unit}]" if unit else "", fontsize=8)
+        axes.set_ylabel("%" if unit == "%" else "", fontsize=8)
         axes.sharey(residuals[0])
     for axes in panels:
         axes.tick_params(labelsize=8)
         axes.yaxis.set_major_locator(MaxNLocator(4))
     quantity, unit_of_time = split(data.time_name)
     panels[-1].set_xlabel(f"{quantity} [{unit_of_time.text}]" if unit_of_time else quantity, fontsize=9)
+    title = data.title_of(data.outputs[k])
+    figure.supylabel(title if unit in ("", "%") else f"{title} [{unit}]", fontsize=9)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", fontsize=8, frameon=False, ncols=2)
     return figure
@@ -213,13 +214,13 @@ def _draw_trace(
     """Draw one trace: what was measured, what models predict, and a band about the last one."""
     (factor, unit), time = data.scale_of(data.outputs[k]), np.asarray(data.time)[rows]
     is_ratio = unit == "%"
-    (name, measured), *models = [(name, curve[rows]) for name, curve in curves]
+    (name, measured), *models = ((name, curve[rows]) for name, curve in curves)
 
     def plain(values: Floats) -> Floats:
         return np.exp(values) if is_ratio else factor * values
 
     if data.heads is not None and (head := data.heads[rows]).any():
-        axes.axvspan(time[0], time[head][-1], color=PALE, lw=0, label="its own numbers are fitted here")
+        axes.axvspan(time[0], time[head][-1], color=PALE, alpha=0.5, lw=0, label="its own numbers are fitted here")
     if band:
         last = models[-1][1]
         axes.fill_between(time, plain(last - band), plain(last + band), color=GREEN if len(models) > 1 else ORANGE,
@@ -227,15 +228,13 @@ def _draw_trace(
     axes.plot(time, plain(measured), ".", ms=3, color=INK, label=name)
     for (name, curve), colour in zip(models, (ORANGE, GREEN), strict=False):
         axes.plot(time, plain(curve), color=colour, lw=1.2, label=name)
-    title = data.title_of(data.outputs[k])
-    axes.set_ylabel(fill(title if is_ratio or not unit else f"{title} [{unit}]", _LINE), fontsize=8)
 
 
 def _ranked(result: Findings, residual: Floats) -> list[tuple[Flags, str]]:
     """Choose held-out traces by the rms of a residual (n,): their rows (n,), each with its name and rank."""
     data, test, trace = result.runs, result.split.test, np.asarray(result.runs.trace)
     traces = np.unique(trace[test])
-    errors = [float(np.sqrt(np.mean(residual[test & (trace == each)] ** 2))) for each in traces]
+    errors = [float(np.sqrt(np.nanmean(residual[test & (trace == each)] ** 2))) for each in traces]
     order = np.argsort(errors)
     places = {int(order[0]): "least error", int(order[len(order) // 2]): "median", int(order[-1]): "largest error"}
     words = places if len(traces) > 1 else {0: ""}

@@ -75,7 +75,7 @@ def differences_of_traces(runs: Runs, *, level: float) -> tuple[Difference, ...]
     while tests := [test for k in outputs for test in _tests(_groups(runs, k, good))]:
         group, logarithm, F, p = min(tests, key=lambda test: float(test[1].min()))
         j, s = (int(place) for place in np.unravel_index(np.argmin(logarithm), logarithm.shape))
-        if (least := float(p[j, s]) * good.sum() * len(outputs)) > level:
+        if (least := float(p[j, s] * good.sum() * len(outputs))) > level:
             break
         alike = np.flatnonzero(logarithm[j] < logarithm[j, s] + _ALIKE)
         found.append(_difference(runs, group, j, s, float(F[j, s]), least, alike))
