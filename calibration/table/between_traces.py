@@ -70,8 +70,9 @@ def differences_of_traces(runs: Runs, *, level: float) -> tuple[Difference, ...]
     level *= SHARE_OF_LEVEL
     outputs, good, found = range(len(runs.outputs)), np.ones(len(runs.trace_names), dtype=bool), []
     for j, flat in [each for k in outputs for each in _flat_ends(runs, k, good, level)]:
-        found += [flat] * bool(good[j])
-        good[j] = False
+        if good[j]:
+            found.append(flat)
+            good[j] = False
     while tests := [test for k in outputs for test in _tests(_groups(runs, k, good))]:
         group, logarithm, F, p = min(tests, key=lambda test: float(test[1].min()))
         j, s = (int(place) for place in np.unravel_index(np.argmin(logarithm), logarithm.shape))
@@ -116,9 +117,9 @@ def _repeated(runs: Runs, k: int, good: Flags) -> list[tuple[Integers, Floats, I
     label, repeated = connected_components(shared @ shared.T)[1], []
     for traces in (np.flatnonzero((label == each) & good) for each in np.unique(label[good])):
         rows = row[np.ix_(traces, np.flatnonzero(shared[traces].all(0)))]
-        if len(traces) > 1 and rows.shape[1] >= _FEWEST:
-            rows = rows[:, np.argsort(runs.time[rows].mean(0))]
-            repeated.append((traces, runs.time[rows].mean(0), rows))
+        time, first = np.unique(runs.time[rows].sum(0) / len(traces), return_index=True)
+        if len(traces) > 1 and len(time) >= _FEWEST:
+            repeated.append((traces, time, rows[:, first]))
     return repeated
 
 

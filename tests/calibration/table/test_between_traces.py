@@ -110,6 +110,11 @@ def test_readings_that_are_missing_or_at_other_times_are_no_fault():
     assert differences_of_traces(runs.subset(rows), level=LEVEL) == ()
 
 
+def test_two_readings_at_one_time_count_once():
+    y, time = np.repeat(faulty("step", 1), 2, axis=1), np.repeat(TIME, 2)
+    assert [d.kind for d in differences_of_traces(traces(y, time=time), level=LEVEL)] == ["step"]
+
+
 def test_coarse_readings_are_no_saturation():
     y = np.round(10 * np.exp(-9 * ALONG) + 0.2 * noise(5, 6))
     assert "saturation" not in [kind for _, kind in found(y)]
