@@ -101,13 +101,16 @@ def test_sizes_are_those_of_the_fault():
     assert by_kind["step"].where == "at 930 s"
 
 
-def test_readings_that_are_missing_or_at_other_times_are_no_fault():
-    """One trace begins four readings late; each is read a little before or after the others."""
-    times = TIME + np.random.default_rng(1).uniform(-9, 9, (4, 1))
-    y = 333 * np.exp(-4 * (times - TIME[0]) / (TIME[-1] - TIME[0])) + noise(2, 4)
-    runs = replace(traces(y), time=times.ravel())
-    rows = np.flatnonzero((runs.trace != 2) | (np.arange(len(runs)) % READINGS > 3))
-    assert differences_of_traces(runs.subset(rows), level=LEVEL) == ()
+@pytest.mark.parametrize(("size", "named"), [(0, []), (4, [("cup D", "step")])])
+def test_readings_that_are_missing_or_at_other_times_are_no_fault(size: float, named: list[tuple[str, str]]):
+    """One trace begins four readings late; each reading is a little before or after those of the other traces."""
+    for seed in range(6):
+        times = TIME + np.random.default_rng(seed).uniform(-9, 9, (6, READINGS))
+        y = 333 * np.exp(-4 * (times - TIME[0]) / (TIME[-1] - TIME[0])) + noise(seed, 6)
+        y[3, 30:] += size
+        runs = replace(traces(y), time=times.ravel())
+        rows = np.flatnonzero((runs.trace != 2) | (np.arange(len(runs)) % READINGS > 3))
+        assert [(d.column, d.kind) for d in differences_of_traces(runs.subset(rows), level=LEVEL)] == named
 
 
 def test_two_readings_at_one_time_count_once():
@@ -116,7 +119,10 @@ def test_two_readings_at_one_time_count_once():
 
 
 def test_coarse_readings_are_no_saturation():
+    """What flips between two steps of the scale in one trace may stay within one in another."""
     y = np.round(10 * np.exp(-9 * ALONG) + 0.2 * noise(5, 6))
+    y[:, -20:] = np.random.default_rng(1).integers(0, 2, (6, 20))
+    y[1, -20:] = 0
     assert "saturation" not in [kind for _, kind in found(y)]
 
 
