@@ -24,7 +24,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_triangular
 from scipy.sparse.csgraph import connected_components
 from scipy.special import bdtrc, fdtrc, ndtri
 
@@ -143,42 +142,35 @@ def _groups(runs: Runs, k: int, good: Flags) -> list[_Group]:
 
 def _tests(groups: list[_Group]) -> list[tuple[_Group, Floats, Floats, Floats]]:
     """Test every trace for every shape: with ln p, which sets an order where p is 0, with F and p, (m, S) each."""
-    likelihoods: list[list[Floats]] = [[] for _ in groups]
-    ratios: list[list[Floats]] = [[] for _ in groups]
     freedom = sum((len(g.traces) - 1) * (len(g.time) - g.own.shape[1]) for g in groups) - 1
-    for roots in zip(*(_roots(g.time) for g in groups), strict=True):
-        square, penalty, gains = 0.0, 0.0, []
-        for g, root in zip(groups, roots, strict=True):
-            m, q = len(g.traces), g.own.shape[1]
-            white = solve_triangular(root, np.column_stack([g.own, g.shapes, g.y.T]), lower=True)
-            basis, triangle = np.linalg.qr(white[:, :q])
-            left = white[:, q:] - basis @ (basis.T @ white[:, q:])
-            shapes, y = left[:, :-m], left[:, -m:]
-            length = np.maximum((shapes**2).sum(0) * (m - 1) / m, _TINY)
-            square += float((y**2).sum())
-            penalty += 2 * (m - 1) * float(np.log(np.abs(np.diag(root).prod() * np.diag(triangle).prod())))
-            gains.append(((y.T @ shapes) ** 2 / length, np.log(length)))
-        for (gain, length), of_group, ratio in zip(gains, likelihoods, ratios, strict=True):
-            rest = np.maximum(square - gain, _TINY)
-            of_group.append(-0.5 * (freedom * np.log(rest) + penalty + length))
-            ratio.append(gain / rest * freedom)
-    tested = []
-    for g, of_group, ratio in zip(groups, likelihoods, ratios, strict=True):
-        plausible = np.array(of_group) > np.max(of_group, 0) - _PLAUSIBLE
-        F = np.where(plausible, ratio, np.inf).min(0)
+    square, penalty, gains, tested = np.zeros((1, 1, 1)), np.zeros((1, 1, 1)), [], []
+    for g in groups:
+        m, q, root = len(g.traces), g.own.shape[1], _roots(g.time)
+        white = np.linalg.solve(root, np.column_stack([g.own, g.shapes, g.y.T]))
+        basis, triangle = np.linalg.qr(white[..., :q])
+        left = white[..., q:] - basis @ (basis.mT @ white[..., q:])
+        shapes, y = left[..., :-m], left[..., -m:]
+        length = np.maximum((shapes**2).sum(1, keepdims=True) * (m - 1) / m, _TINY)
+        logarithms = sum(np.log(np.abs(np.diagonal(each, axis1=1, axis2=2))).sum(1) for each in (root, triangle))
+        square = square + (y**2).sum((1, 2), keepdims=True)
+        penalty = penalty + 2 * (m - 1) * np.reshape(logarithms, (-1, 1, 1))
+        gains.append(((y.mT @ shapes) ** 2 / length, np.log(length)))
+    for g, (gain, length) in zip(groups, gains, strict=True):
+        rest = np.maximum(square - gain, _TINY)
+        likelihood = -0.5 * (freedom * np.log(rest) + penalty + length)
+        F = np.where(likelihood > likelihood.max(0) - _PLAUSIBLE, gain / rest * freedom, np.inf).min(0)
         count = _KINDS * np.repeat([1, 1, F.shape[1] - 2], [1, 1, F.shape[1] - 2])
         logarithm = np.log(count) - 0.5 * freedom * np.log1p(F / freedom)
         tested.append((g, logarithm, F, count * fdtrc(1, freedom, F)))
     return tested
 
 
-def _roots(time: Floats) -> list[Floats]:
-    """Compute the Cholesky factors of R at the times (T,), for every w and τ."""
+def _roots(time: Floats) -> Floats:
+    """Compute the Cholesky factors of R at the times (T,), for every w and τ, (K, T, T)."""
     apart = np.abs(time[:, None] - time) / np.median(np.diff(time))
-    pairs = [(w, tau) for w in _WHITE for tau in (_MEMORY if w < 1 else _MEMORY[:1])]
-    return [
-        np.asarray(np.linalg.cholesky(w * np.eye(len(time)) + (1 - w) * np.exp(-apart / tau))) for w, tau in pairs
-    ]
+    pairs = np.array([(w, tau) for w in _WHITE for tau in (_MEMORY if w < 1 else _MEMORY[:1])])
+    w, tau = pairs.T[:, :, None, None]
+    return np.asarray(np.linalg.cholesky(w * np.eye(len(time)) + (1 - w) * np.exp(-apart / tau)))
 
 
 def _difference(runs: Runs, group: _Group, j: int, s: int, F: float, p: float, alike: Integers) -> Difference:
