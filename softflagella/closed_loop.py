@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from sim.robot_rows import OneRobot
 
 MAX_PREDICTIONS = 300_000  # of one run of a robot, for the search
-MAX_PREDICTIONS_OF_OWN_MODEL = 10_000_000  # a function of one's own predicts many rows at once
+MAX_PREDICTIONS_OF_OWN_MODEL = 100_000_000  # a function of one's own predicts many rows at once
 
 
 @checks_keywords
@@ -85,7 +85,7 @@ def calibrate(
             output where differences are compared.
         notes: COL, a column in which runs may differ without the model's knowledge; columns that are not named
             then are not looked at (default: all others).
-        max_predictions: of a run, for the search (default 300,000; for a model of your own 10,000,000, over the
+        max_predictions: of a run, for the search (default 300,000; for a model of your own 100,000,000, over the
             whole calibration). A verdict that this cuts short is provisional, and says what was not tried.
         max_seconds: of processor time, for the same (default: no limit), where a model is slow. Time in which a
             function of your own waits for another program counts. What is cut short depends on the machine then.

@@ -291,7 +291,7 @@ def _number_check(number: Hypothesis) -> dict[str, Any]:
 
 
 def _difference(d: Difference, runs: Runs) -> dict[str, Any]:
-    names = ("output", "column", "where", "against", "of_reading", "size", "z", "p")
+    names = ("output", "column", "where", "against", "of_reading", "kind", "size", "z", "p")
     record = {name: getattr(d, name) for name in names} | {"instead": list(d.instead), "numbers": list(d.numbers)}
     return {"words": difference_in_words(_outputs(runs), record), **record}
 

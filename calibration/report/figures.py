@@ -29,6 +29,7 @@ from calibration.table.runs import Runs
 from calibration.words.quantities import feature_in_words, final_model
 from common.arrays import Flags, Floats
 from common.pages import BLUE, GREEN, INK, ORANGE, PALE, RED, VIOLET
+from common.units import split
 from sim.model.robot import Robot
 from sim.pictures.robot_views import arrow, curved_arrow, draw_robot, scene
 
@@ -39,12 +40,18 @@ _COLOURS: dict[Model, str] = {"as_given": ORANGE, "corrected": GREEN}
 _SCALES = {"ω": (30 / math.pi, "motor speed ω [rpm]"), "l": (100.0, "tail length l [cm]"), "N": (1.0, "tails N")}
 _LONG = 0.45  # of an arrow, in l
 _LINE = 24  # letters in a line of a label
+_OUTPUTS, _LEAST = 2, 1e-300  # outputs of which curves are drawn
 _SAMPLES, _CORNER = 1500, 6  # rows, and numbers that are drawn in pairs
 _WIDEST = 1e3  # samples, over their middle
 _TICKS = (3.0, 10.0, 30.0, 100.0, 300.0)
 _LAW = (
     "On what it depends. Line and band: the law. Points: the factor that the runs at this input ask for, "
     "everything else fitted anew, with one standard error."
+)
+
+_CURVES = (
+    "Held-out traces, each predicted from the beginning that is shaded, to which its own numbers are fitted. "
+    "Below: measured minus model, of every trace that was fitted."
 )
 
 Drawn = tuple[Figure, str, str]  # with a description and a caption
@@ -57,11 +64,15 @@ def draw_all(result: Findings) -> dict[str, list[Drawn]]:
     figures: dict[str, Callable[[], list[Drawn]]] = {
         "summary": lambda: [(draw_summary(result), "residual of each output over the noise, for each model",
                              "The same on the runs that were fitted, for each output.")],
-        "residuals": lambda: [(figure, f"residuals by output and {kind}, {model}", model)
-                              for figure, model in draw_residuals(result)],
-        "maps": lambda: [(figure, f"map of the residual over the runs' inputs, {model}", model)
-                         for figure, model in draw_maps(result)],
     }  # fmt: skip
+    if result.runs.trace is not None:
+        figures["curves"] = lambda: [(figure, f"{output} of held-out traces against time, and residuals", _CURVES)
+                                     for figure, output in draw_curves(result)]  # fmt: skip
+    else:
+        figures["residuals"] = lambda: [(figure, f"residuals by output and {kind}, {model}", model)
+                                        for figure, model in draw_residuals(result)]  # fmt: skip
+    figures["maps"] = lambda: [(figure, f"map of the residual over the runs' inputs, {model}", model)
+                               for figure, model in draw_maps(result)]  # fmt: skip
     if result.attribution.misfit.critical_z > 0:  # else no effect can be told from the numbers
         words = "score of each effect against what a claim needs"
         figures["evidence"] = lambda: [(draw_evidence(result), words, "")]
@@ -145,6 +156,90 @@ def draw_residuals(result: Findings) -> list[tuple[Figure, str]]:
     limits = 1.1 * np.max([np.abs(residual).max(0) for residual in residuals.values()], 0)
     limits = np.where(limits > 0, limits, 1.0)  # also where no run departs
     return [(_draw_residual(residual, limits, used, data), label) for label, residual in residuals.items()]
+
+
+def draw_curves(result: Findings) -> list[tuple[Figure, str]]:
+    """Draw held-out traces with what models predict, and the residuals of the fitted ones, against time.
+
+    Of the traces that of the least error, the median and that of the largest.
+
+    Returns:
+        A figure for each output, at most _OUTPUTS of them, those with the largest gain; each with its output.
+    """
+    data, errors = result.runs, result.errors.by_output
+    gains = [errors["after"][name] / max(errors["before"][name], _LEAST) for name in data.outputs]
+    shown = sorted(np.argsort(gains, kind="stable")[:_OUTPUTS].tolist())
+    return [(_draw_curves(result, k), data.title_of(data.outputs[k])) for k in shown]
+
+
+def _draw_curves(result: Findings, k: int) -> Figure:
+    """Draw the curves of an output."""
+    data, (factor, unit) = result.runs, result.runs.scale_of(result.runs.outputs[k])
+    measured = np.where(data.gaps[:, k], np.nan, data.raw(data.y)[:, k])
+    models = [(name, data.raw(prediction)[:, k]) for name, prediction in compared(result)]
+    held_out = _ranked(result, measured - models[-1][1])
+    heights = [*(1.25 for _ in held_out), *(0.9 for _ in models)]
+    assert data.trace is not None
+    assert data.time is not None
+    figure = Figure(figsize=(_WIDTH, sum(heights) + 1.4), layout="constrained")
+    panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights, squeeze=False)[:, 0]
+    curves, residuals = panels[: len(held_out)], panels[len(held_out) :]
+    band = 2 * float(np.sqrt(result.final.noise.run_covariance[k, k])) if data.noise_known else 0.0
+    for axes, (rows, words) in zip(curves, held_out, strict=True):
+        _draw_trace(axes, data, rows, [("measured", measured), *models], k, band)
+        axes.set_title(words, fontsize=8, loc="left", pad=3, parse_math=False)
+    for axes, (name, curve), colour in zip(residuals, models, (ORANGE, GREEN), strict=False):
+        for trace in np.setdiff1d(data.trace[result.split.fitted], data.trace[result.split.test]):
+            rows = data.trace == trace
+            axes.plot(data.time[rows], factor * (measured - curve)[rows], color=colour, lw=0.6, alpha=0.7)
+        axes.axhline(0, color=INK, lw=0.6)
+        axes.set_title(f"measured − {name}", fontsize=8, loc="left", pad=3)
+        axes.set_ylabel("%" if unit == "%" else "", fontsize=8)
+        axes.sharey(residuals[0])
+    for axes in panels:
+        axes.tick_params(labelsize=8)
+        axes.yaxis.set_major_locator(MaxNLocator(4))
+    quantity, unit_of_time = split(data.time_name)
+    panels[-1].set_xlabel(f"{quantity} [{unit_of_time.text}]" if unit_of_time else quantity, fontsize=9)
+    title = data.title_of(data.outputs[k])
+    figure.supylabel(title if unit in ("", "%") else f"{title} [{unit}]", fontsize=9)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", fontsize=8, frameon=False, ncols=2)
+    return figure
+
+
+def _draw_trace(
+    axes: Axes, data: Runs, rows: Flags, curves: Sequence[tuple[str, Floats]], k: int, band: float
+) -> None:
+    """Draw one trace: what was measured, what models predict, and a band about the last one."""
+    (factor, unit), time = data.scale_of(data.outputs[k]), np.asarray(data.time)[rows]
+    is_ratio = unit == "%"
+    (name, measured), *models = ((name, curve[rows]) for name, curve in curves)
+
+    def plain(values: Floats) -> Floats:
+        return np.exp(values) if is_ratio else factor * values
+
+    if data.heads is not None and (head := data.heads[rows]).any():
+        axes.axvspan(time[0], time[head][-1], color=PALE, alpha=0.5, lw=0, label="its own numbers are fitted here")
+    if band:
+        last = models[-1][1]
+        axes.fill_between(time, plain(last - band), plain(last + band), color=GREEN if len(models) > 1 else ORANGE,
+                          alpha=0.2, lw=0, label="± 2 σ of the noise")  # fmt: skip
+    axes.plot(time, plain(measured), ".", ms=3, color=INK, label=name)
+    for (name, curve), colour in zip(models, (ORANGE, GREEN), strict=False):
+        axes.plot(time, plain(curve), color=colour, lw=1.2, label=name)
+
+
+def _ranked(result: Findings, residual: Floats) -> list[tuple[Flags, str]]:
+    """Choose held-out traces by the rms of a residual (n,): their rows (n,), each with its name and rank."""
+    data, test, trace = result.runs, result.split.test, np.asarray(result.runs.trace)
+    traces = np.unique(trace[test])
+    errors = [float(np.sqrt(np.nanmean(residual[test & (trace == each)] ** 2))) for each in traces]
+    order = np.argsort(errors)
+    places = {int(order[0]): "least error", int(order[len(order) // 2]): "median", int(order[-1]): "largest error"}
+    words = places if len(traces) > 1 else {0: ""}
+    return [(trace == traces[i], f"{data.trace_names[traces[i]]}{f', {rank}' if rank else ''}")
+            for i, rank in words.items()]  # fmt: skip
 
 
 def _draw_residual(residual: Floats, limits: Floats, used: Flags, data: Runs) -> Figure:

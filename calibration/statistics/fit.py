@@ -170,7 +170,7 @@ class Fit:
     @property
     def tangents(self) -> Floats:
         """Derivatives (n, k, p) of what is free: zero along parameters that are held."""
-        return np.where(self.held, 0.0, self.jacobian)
+        return np.where(self.held, 0.0, self.jacobian) if self.held.any() else self.jacobian
 
     def half_width(self, place: int) -> float:
         """Compute half of the 95 % interval of a parameter that is free, on its own scale."""

@@ -21,6 +21,7 @@ from calibration.statistics.forward import stacked
 from calibration.statistics.statistical_model import Experiment, Parameter, Parameters, Predict, Wrapped, with_runs
 from calibration.statistics.study import middle_session
 from calibration.table.between_repeats import Difference, find_differences
+from calibration.table.between_traces import differences_of_traces
 from common.arrays import Flags, Floats
 
 _LARGEST = 5.0  # of y
@@ -74,15 +75,18 @@ class Offsets(Wrapped):
 
 
 def with_differences(
-    model: Experiment, held_out: Flags | None, **settings: Any
+    model: Experiment, held_out: Flags | None, *, level: float, **settings: Any
 ) -> tuple[Experiment, tuple[Difference, ...]]:
     """Find what differs between the repeats of a model's runs, and give the model a number for each.
 
     Args:
         held_out: (n,); default `middle_session`. What shows in these runs alone has no number.
+        level: of a claim.
         settings: of `find_differences`.
     """
-    found = find_differences(model.runs, **settings)
+    if model.runs.trace is not None:
+        return model, differences_of_traces(model.runs, level=level)
+    found = find_differences(model.runs, level=level, **settings)
     used = ~(middle_session(model.runs) if held_out is None else held_out)
     numbers = {name: (d.output, c) for d in found for name, c in d.numbers.items() if np.ptp(c[used]) > 0}
     if not numbers:

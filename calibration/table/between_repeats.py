@@ -73,6 +73,7 @@ class Difference:
     of_reading: bool = False  # whether it is how such an offset follows what is read
     numbers: Mapping[str, Floats] = field(default_factory=dict)  # name of a number of the fit -> its column (n,)
     instead: tuple[str, ...] = ()  # notes that cannot be told from it
+    kind: str = ""  # of a trace, see `calibration.table.between_traces`; `column` is its name
 
 
 class _Test(NamedTuple):
@@ -190,7 +191,7 @@ def _centred(table: Floats, group: Integers) -> Floats:
     return np.asarray(table - levels @ ((levels.T @ table) / levels.sum(0)[:, None]))
 
 
-def _span(table: Floats) -> Floats:
+def span(table: Floats) -> Floats:
     """Return an orthonormal basis of columns (n, c)."""
     lengths = np.sqrt((table**2).sum(0))
     scaled = np.where(lengths > 1e-9, table / np.maximum(lengths, 1e-9), 0.0)
@@ -214,7 +215,7 @@ class _Left(NamedTuple):
         group = np.unique(group[rows], return_inverse=True)[1].reshape(-1)
         repeated = np.bincount(group)[group] > 1
         rows, group = rows[repeated], group[repeated]
-        basis = _span(_centred(known[rows], group))
+        basis = span(_centred(known[rows], group))
         residual = _centred(y[rows, None], group)[:, 0]
         residual = residual - basis @ (basis.T @ residual)
         far = _FAR * _MAD * float(np.median(np.abs(residual))) if len(rows) else 0.0
@@ -233,7 +234,7 @@ class _Left(NamedTuple):
     def test(self, of: NoteColumn) -> list[_Test]:
         """Test what is left along a column; nothing if too little of the column is left."""
         table, column = of.table, self.column(of.table)
-        along = _span(column)
+        along = span(column)
         a = along.shape[1]
         b = len(self.rows) - len(np.unique(self.group)) - self.basis.shape[1] - a
         whole = float((_centred(table[self.rows], self.session) ** 2).sum())

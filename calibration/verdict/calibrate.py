@@ -65,7 +65,6 @@ from calibration.statistics.weights import (
     noise_of_any_run,
     rows_of_little_weight,
 )
-from calibration.table.between_repeats import Difference
 from calibration.table.excluded import caveat_of_excluded
 from calibration.table.unit_slips import refuse_unit_slips
 from calibration.verdict.describe import adopt_in_turns, forms_in_question
@@ -109,9 +108,7 @@ def calibrate(
         verdict: makes the verdict of what was found, such as one with the corrected robot.
     """
     limit, began, given = limit or Work(), beginning(), model
-    differences: tuple[Difference, ...] = ()
-    if model.runs.trace is None:
-        model, differences = with_differences(model, held_out, level=level, seed=seed)
+    model, differences = with_differences(model, held_out, level=level, seed=seed)
     study, base, uncalibrated = first_fit(model, held_out, level=level, seed=seed, draws=draws, progress=progress)
     model = cast(Experiment, study.model)  # with the weights of its runs
     # Explanations come first; what is left of the limit is for descriptions of what nothing explains.

@@ -22,6 +22,7 @@ _FEATURES = {  # what words of a feature's name read as
     "omega": "ω", "direction": "motor's direction", "elapsed_h": "time", "temperature_K": "temperature",
     "tank_diameter": "diameter of the tank", "course_x": "x of the course", "course_y": "y of the course",
 }  # fmt: skip
+_FAULTS = {"drift": "it drifts", "clock": "its clock is wrong", "step": "something was moved"}  # of traces
 _RESOLVED = 2.01  # over the number of draws and one more: the bootstrap resolves no smaller p
 _SEVERAL = "over all outputs"  # in the place of a unit, where they have several
 _NEARLY_ALL = 0.995
@@ -85,7 +86,9 @@ def difference_in_words(record: Record, difference: Record) -> str:
     """Say a difference, as in "the yaw rate of operator B is 12 % below that of operator A (6.8 σ)"."""
     output, size, where, against = (difference[key] for key in ("output", "size", "where", "against"))
     by, side = offset(record, size, output, signed=False), "below" if size < 0 else "above"
-    if not difference["numbers"]:
+    if difference["kind"]:
+        words = _trace_in_words(record, difference)
+    elif not difference["numbers"]:
         words = f"{output} is {by} {side} 1 {where}"
     elif against:
         words = f"the {output_label(record, output)} of {where} is {by} {side} that of {against}"
@@ -93,6 +96,25 @@ def difference_in_words(record: Record, difference: Record) -> str:
         changes = "changes by ±" if where.startswith("over ") else "falls by" if size < 0 else "rises by"
         words = f"the {output_label(record, output)} {changes} {by} {where}"
     return f"{words} ({difference['z']:.1f} σ)"
+
+
+def _trace_in_words(record: Record, difference: Record) -> str:
+    """Say by what a trace is not like its repeats, as in "the clock of trace cup B runs 3 % fast"."""
+    size, name, where, kind = (difference[key] for key in ("size", "column", "where", "kind"))
+    output, other = difference["output"], difference["against"]
+    by = offset(record, size, output, signed=kind == "step")
+    repeats, of = f"its repeat {other}" if other else "its repeats", "do" if not other else "does"
+    among = f" in {output_label(record, output)}" if len(record["output_titles"]) > 1 else ""
+    words = {
+        "drift": f"trace {name} drifts away from {repeats}{among} by {by} {where}",
+        "clock": f"the clock of trace {name} runs {plain(100 * abs(size), 2)} % {'fast' if size > 0 else 'slow'}"
+        f"{f' against {repeats}' if other else ''}",
+        "step": f"trace {name} steps{among} by {by} {where}, and {repeats} {of} not",
+        "saturation": f"trace {name} stays at one value{among} {where}, while {repeats} "
+        f"{'change' if not other else 'changes'} by {by}",
+    }
+    instead = "".join(f", or {_FAULTS[each]}" for each in difference["instead"])
+    return f"{words[kind]}{instead}"
 
 
 def move_in_words(move: Record, title: str, shown: float, unit: str) -> str:
