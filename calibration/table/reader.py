@@ -200,7 +200,8 @@ class TableReader:
             elif same != name:
                 self.set_aside(bad, f"{name} repeats {same}, value for value")
         usable = self.usable
-        trace, names = self._levels(column, usable)
+        trace, levels = self._levels(column, usable)
+        names = tuple(name.removeprefix("trace ") for name in levels)
         return {"trace": trace, "trace_names": names, "time": time[usable], "time_name": self.declared.time}
 
     @property
