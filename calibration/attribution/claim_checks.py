@@ -3,10 +3,10 @@
 What is outside is not known. It is drawn: the signal of an effect times exp(g), with g a smooth random function of
 the runs' inputs (Gaussian process, correlation length one standard deviation, two for traces, standard deviation
 0.5). So it acts on the same outputs, and depends on N, l and ω in another way. The nuisance parameters and the
-coefficients absorb what they can. Of the rest, the claim absorbs a share a (the absorbable share). A departure that
-passes for a claim of strength Λ (standard deviations) leaves Λ √(1/a − 1). Less than `SEEN` is not noticed. The
-*imitability index* of a claim, or of a pair, is the share of draws that it would not notice. The absorbable shares
-depend on the design alone, not on what was measured.
+coefficients absorb what they can. Of the rest, the claim absorbs a share a (the absorbable share). A departure
+that passes for a claim of strength Λ (standard deviations) leaves Λ √(1/a − 1). Less than `SEEN` is not noticed.
+The *imitability index* of a claim, or of a pair, is the share of draws that it would not notice. The absorbable
+shares depend on the design alone, not on what was measured.
 
 Something outside the catalogue can look like an effect at some runs. It depends on the settings in another way,
 so that the size which fits short tails, say, is wrong for long ones. In the *transfer test* the model with the

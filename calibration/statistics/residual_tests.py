@@ -290,9 +290,7 @@ class _Absorbed:
         ]
         self.data, self.used = data, used
         self.kept = [place for place in range(len(fitted.fitted)) if place not in own]
-        self.bases: list[
-            tuple[Integers, Floats]
-        ] = []  # rows of a trace among those used, and an orthonormal basis
+        self.bases: list[tuple[Integers, Floats]] = []  # rows of a trace among those used, an orthonormal basis
         for trace in np.unique(data.trace[used]) if own and data.trace is not None else ():
             assert data.trace is not None
             rows = np.flatnonzero(data.trace[used] == trace)
