@@ -37,11 +37,11 @@ from calibration.statistics.statistical_model import (
     with_runs,
 )
 from calibration.statistics.study import Study
+from calibration.table.between_traces import repeated_traces
 from calibration.table.runs import Runs
-from common.arrays import Flags, Floats, Integers
+from common.arrays import Flags, Floats
 
 _MORE = 3  # readings, beside what a series absorbs
-_LENGTH = 0.5  # least share of the longest repeat
 _SEEN = 1e-8  # least share of the largest singular value
 _ABSORBED = 1 / 3  # most columns of a trace without repeats, over its readings
 
@@ -116,7 +116,7 @@ def whiten_traces(study: Study, start: dict[str, float]) -> tuple[Study, dict[st
 def _repeats(first: Fit, runs: Runs) -> Iterator[Repeats]:
     """Yield each set of repeated traces."""
     own = _places_of_numbers(first)
-    for rows in _repeated(runs):  # (J, t)
+    for rows in repeated_traces(runs):  # (J, t)
         assert runs.time is not None
         time, along = runs.time[rows].mean(0), first.jacobian[rows]  # (J, t, k, p)
         columns = [along[..., places].sum(-1).mean(0) for places in own.values()]  # (t, k) each
@@ -141,30 +141,6 @@ def _places_of_numbers(first: Fit) -> dict[str, list[int]]:
         if parameter.of_group:
             own.setdefault(parameter.of_group[0], []).append(place)
     return own
-
-
-def _repeated(runs: Runs) -> Iterator[Integers]:
-    """Yield the rows (J, t) of readings that each set of repeated traces has in common, in the order of time.
-
-    A trace of less than half of the longest one is left out.
-    """
-    assert runs.trace is not None
-    conditions = [set(runs.condition[runs.trace == trace].tolist()) for trace in range(len(runs.trace_names))]
-    left = list(range(len(conditions)))
-    while left:
-        alike = [trace for trace in left if conditions[trace] & conditions[left[0]]]
-        left = [trace for trace in left if trace not in alike]
-        longest = max(len(conditions[trace]) for trace in alike)
-        alike = [trace for trace in alike if len(conditions[trace]) >= _LENGTH * longest]
-        shared = set.intersection(*(conditions[trace] for trace in alike))
-        if len(alike) > 1 and shared:
-            yield np.stack([_first_of_each(runs, runs.trace == trace, shared) for trace in alike])
-
-
-def _first_of_each(runs: Runs, rows: Flags, shared: set[int]) -> Integers:
-    """Return the first reading of a trace with each of some conditions."""
-    places = np.flatnonzero(rows & np.isin(runs.condition, list(shared)))
-    return np.asarray(places[np.sort(np.unique(runs.condition[places], return_index=True)[1])])
 
 
 def _of_each_trace(study: Study, first: Fit, used: Flags) -> Iterator[Repeats]:

@@ -37,6 +37,7 @@ _MEMORY = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 200.0)  # τ, in steps
 _PLAUSIBLE = 2.0  # of ℓ
 _KINDS = 4  # of faults
 _FEWEST, _MOST = 8, 100  # readings of a trace that are compared; more are averaged in blocks
+_LENGTH = 0.5  # least share of the longest repeat
 _EDGE = 3  # readings on each side of a step
 _CLEAR = 2.0  # standard deviation of f over that of a difference from which f is known
 _ALIKE = 5.0  # logarithm of the ratio of p-values of faults that cannot be told apart
@@ -86,7 +87,7 @@ def differences_of_traces(runs: Runs, *, level: float) -> tuple[Difference, ...]
 def _flat_ends(runs: Runs, k: int, good: Flags, level: float) -> list[tuple[int, Difference]]:
     """Find traces that end with equal readings while their repeats go on; each with its number."""
     flat = []
-    for traces, _, rows in _repeated(runs, k, good):
+    for traces, _, rows in _comparable(runs, k, good):
         for j, y in zip(traces.tolist(), table := runs.y[rows, k], strict=True):
             equal = y == y[-1]  # at an end of the scale noise may leave it for a reading
             at_end = y[-1] in (runs.y[:, k].min(), runs.y[:, k].max()) or equal.all()
@@ -105,27 +106,46 @@ def _flat_ends(runs: Runs, k: int, good: Flags, level: float) -> list[tuple[int,
     return flat
 
 
-def _repeated(runs: Runs, k: int, good: Flags) -> list[tuple[Integers, Floats, Integers]]:
+def repeated_traces(runs: Runs, there: Flags | None = None) -> list[Integers]:
+    """List the rows (m, T) of the readings that each set of repeated traces shares, in the order of time.
+
+    A trace with less than half as many readings as the longest one is left out.
+
+    Args:
+        there: (n,) readings that count; default: all.
+    """
+    assert runs.trace is not None
+    assert runs.time is not None
+    rows = np.arange(len(runs)) if there is None else np.flatnonzero(there)
+    row = np.full((len(runs.trace_names), int(runs.condition.max()) + 1), -1)
+    row[runs.trace[rows[::-1]], runs.condition[rows[::-1]]] = rows[::-1]  # the first of several readings at a time
+    has = (row >= 0).astype(float)
+    label, repeated = connected_components(has @ has.T)[1], []
+    for each in np.unique(label):
+        traces = np.flatnonzero((label == each) & has.any(1))
+        traces = traces[has[traces].sum(1) >= _LENGTH * has[traces].sum(1).max(initial=0.0)]
+        shared = row[np.ix_(traces, np.flatnonzero(has[traces].all(0)))]
+        if len(traces) > 1 and shared.size:
+            repeated.append(shared[:, np.argsort(runs.time[shared].mean(0), kind="stable")])
+    return repeated
+
+
+def _comparable(runs: Runs, k: int, good: Flags) -> list[tuple[Integers, Floats, Integers]]:
     """List repeats among good traces: their numbers (m,), and the times (T,) and rows (m, T) that they share."""
     assert runs.trace is not None
     assert runs.time is not None
-    there = np.flatnonzero(good[runs.trace] & ~runs.gaps[:, k])
-    row = np.full((len(good), int(runs.condition.max()) + 1), -1)
-    row[runs.trace[there], runs.condition[there]] = there
-    shared = (row >= 0).astype(float)
-    label, repeated = connected_components(shared @ shared.T)[1], []
-    for traces in (np.flatnonzero((label == each) & good) for each in np.unique(label[good])):
-        rows = row[np.ix_(traces, np.flatnonzero(shared[traces].all(0)))]
-        time, first = np.unique(runs.time[rows].sum(0) / len(traces), return_index=True)
-        if len(traces) > 1 and len(time) >= _FEWEST:
-            repeated.append((traces, time, rows[:, first]))
-    return repeated
+    comparable = []
+    for rows in repeated_traces(runs, good[runs.trace] & ~runs.gaps[:, k]):
+        time, first = np.unique(runs.time[rows].mean(0), return_index=True)
+        if len(time) >= _FEWEST:
+            comparable.append((runs.trace[rows[:, 0]], time, rows[:, first]))
+    return comparable
 
 
 def _groups(runs: Runs, k: int, good: Flags) -> list[_Group]:
     """Prepare repeats to be compared."""
     groups = []
-    for traces, time, rows in _repeated(runs, k, good):
+    for traces, time, rows in _comparable(runs, k, good):
         blocks = np.array_split(np.arange(len(time)), min(len(time), _MOST))
         tables = (runs.y[rows, k], runs.time[rows] - time, time)  # type: ignore[index]
         y, off, t = (np.stack([table[..., b].mean(-1) for b in blocks], -1) for table in tables)
