@@ -24,6 +24,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.sparse.csgraph import connected_components
 from scipy.special import bdtrc, fdtrc, ndtri
 
@@ -38,7 +39,7 @@ _PLAUSIBLE = 2.0  # of ℓ
 _KINDS = 4  # of faults
 _FEWEST, _MOST = 8, 100  # readings of a trace that are compared; more are averaged in blocks
 _LENGTH = 0.5  # least share of the longest repeat
-_EDGE = 3  # readings on each side of a step
+_EDGE, _AT_ENDS = 3, 10  # fewest readings on each side of a step, and least share of them, its inverse
 _CLEAR = 2.0  # standard deviation of f over that of a difference from which f is known
 _ALIKE = 5.0  # logarithm of the ratio of p-values of faults that cannot be told apart
 _FLAT, _GOES_ON = 6, 4  # fewest equal readings at an end, and fewest values of each repeat meanwhile
@@ -149,13 +150,14 @@ def _groups(runs: Runs, k: int, good: Flags) -> list[_Group]:
         blocks = np.array_split(np.arange(len(time)), min(len(time), _MOST))
         tables = (runs.y[rows, k], runs.time[rows] - time, time)  # type: ignore[index]
         y, off, t = (np.stack([table[..., b].mean(-1) for b in blocks], -1) for table in tables)
-        slope = np.gradient(y.mean(0), t, edge_order=2)
+        slope = CubicSpline(t, y.mean(0)).derivative()(t)  # a difference quotient is too low along a wave
         y = y - slope * off  # to the times that they share
         curve, y = y.mean(0), y - y.mean(0)
         clear = curve.std() > _CLEAR * y.std(1).max()
         own = np.column_stack([np.ones_like(t), *((curve - curve.mean(), slope) if clear else ())])
         drift, clock = (t - t[0]) / (t[-1] - t[0]), -slope * (t - t[0]) * clear
-        shapes = np.column_stack([drift, clock, t[:, None] >= t[_EDGE : len(t) - _EDGE + 1]])
+        edge = max(_EDGE, len(t) // _AT_ENDS)
+        shapes = np.column_stack([drift, clock, t[:, None] >= t[edge : len(t) - edge + 1]])
         groups.append(_Group(k, traces, t, y, span(own), shapes))
     return groups
 
