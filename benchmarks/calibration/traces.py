@@ -1,9 +1,9 @@
 """Claims and intervals on time series: cups that cool and a pendulum, with noise that remembers.
 
-Tables by `tests.oracles.drawn_traces`: three, six or twelve traces of 40 to 100 readings on three days, of which
-one is held out. ρ is the correlation of neighbouring readings. Planted terms have the size λ: standard deviations of
-their score under the true covariance, all numbers free. Tables of a case differ in experiment, number of traces and
-term, in turn.
+Tables by `tests.oracles.drawn_traces`: three, six or twelve traces of 40 to 100 readings on three days, one
+of which is held out. ρ is the correlation of neighbouring readings. Planted terms have the size λ in standard
+deviations of their score under the true covariance, all numbers free. Tables of a case differ in experiment,
+number of traces and term, in turn.
 
 Usage: python -m benchmarks traces [TABLES] [FIRST_SEED] [CASES] [FILE]
        CASES: words of the cases to run, separated by |; default all. Seeds of a case begin a thousand apart.
@@ -67,7 +67,7 @@ def said(case: TraceCase, seed: int) -> dict[str, Any]:
     """Draw a table, and say what its verdict is worth."""
     name, design, term = varied(case, seed)
     family, began = FAMILIES[name], time.process_time()
-    planted = {term: size_at(family, design, seed, term, _STRENGTH)} if term else {}
+    planted: dict[str, Any] = {term: size_at(family, design, seed, term, _STRENGTH)} if term else {}
     table = draw_traces(family, design, seed, **planted)
     record = {"case": case.label, "seed": seed, "experiment": name, "traces": design.traces, "term": term}
     try:
