@@ -26,6 +26,14 @@ from tests.oracles.drawn_traces import FAMILIES, Design, Family, draw_traces, mo
 _NULL, _PLANTED, _MIMIC = "nothing", "effect", "mimic"
 _CROWDS = (3, 6, 12)  # traces of a table
 _STRENGTH = 8.0  # λ
+_ASKED = {
+    "claimed": "an effect is claimed",
+    "plainly": "without a warning",
+    "right": "right, or in the set",
+    "adopted": "a form is adopted",
+    "moved": "a number moved",
+    "unexplained": "unexplained",
+}
 
 
 class TraceCase(NamedTuple):
@@ -82,6 +90,8 @@ def said(case: TraceCase, seed: int) -> dict[str, Any]:
         "verdict": verdict.verdict,
         "claimed": sorted(set().union(*sets)),
         "adopted": verdict.nearest.effect.name if verdict.nearest else "",
+        "moved": bool(verdict.moves),
+        "unexplained": verdict.verdict == "unexplained",
         "right": bool(term) and any(term in each for each in (*sets, *beside)),
         "plainly": bool(claims) and not any(claim.doubts for claim in claims),
         "covered": covered(verdict, family),
@@ -91,25 +101,20 @@ def said(case: TraceCase, seed: int) -> dict[str, Any]:
 
 def report(records: list[dict[str, Any]]) -> None:
     """Print the table: a row for each case, and for its parts."""
-    print(
-        heading("case", "tables", "failed", "claimed", "… without a warning", "right", "adopted", "intervals hold")
-    )
+    print(heading("case", "tables", "failed", *_ASKED.values(), "intervals hold"))
     for case in CASES:
         whole = [each for each in records if each["case"] == case.label]
         parts = {case.label: whole} if whole else {}
-        for key in ("experiment", "traces"):
-            for value in dict.fromkeys(each[key] for each in whole):
-                words = value if key == "experiment" else f"{value} traces"
-                parts[f"… {words}"] = [each for each in whole if each[key] == value]
+        for key, words in (("experiment", "{}"), ("traces", "{} traces"), ("term", "{}")):
+            for value in sorted({each[key] for each in whole} - {""}):
+                parts[f"… {words.format(value)}"] = [each for each in whole if each[key] == value]
         for label, part in parts.items():
             judged = [each for each in part if "failed" not in each]
             held = [hit for each in judged for hit in each["covered"]]
-            if judged:
-                shares = [per_cent(sum(bool(each[key]) for each in judged), len(judged))
-                          for key in ("claimed", "plainly", "right", "adopted")]  # fmt: skip
-                print(row(label, len(part), len(part) - len(judged), *shares, per_cent(sum(held), len(held))))
-            else:
-                print(row(label, len(part), len(part), "", "", "", "", ""))
+            shares = [per_cent(sum(bool(each[key]) for each in judged), len(judged)) if judged else ""
+                      for key in _ASKED]  # fmt: skip
+            covered_share = per_cent(sum(held), len(held)) if held else ""
+            print(row(label, len(part), len(part) - len(judged), *shares, covered_share))
     seconds = [each["seconds"] for each in records]
     print(f"\nProcessor time of a table: mean {sum(seconds) / len(seconds):.1f} s, largest {max(seconds):.1f} s")
 
