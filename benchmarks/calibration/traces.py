@@ -84,7 +84,7 @@ def said(case: TraceCase, seed: int) -> dict[str, Any]:
         )
     except Exception as error:
         return record | {"failed": f"{type(error).__name__}: {error}", "seconds": time.process_time() - began}
-    claims, sets = verdict.claims, [{e.name for e in c.added} for c in verdict.claims]
+    sets = [{e.name for e in c.added} for c in verdict.claims]
     beside = [{e.name for e in c.added} for c in verdict.attribution.rival_effects]
     return record | {
         "verdict": verdict.verdict,
@@ -93,7 +93,7 @@ def said(case: TraceCase, seed: int) -> dict[str, Any]:
         "moved": bool(verdict.moves),
         "unexplained": verdict.verdict == "unexplained",
         "right": bool(term) and any(term in each for each in (*sets, *beside)),
-        "plainly": bool(claims) and not any(claim.doubts for claim in claims),
+        "plainly": bool(sets) and not verdict.facts["imitable"],  # as its sentence says
         "covered": covered(verdict, family),
         "seconds": time.process_time() - began,
     }
