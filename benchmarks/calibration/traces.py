@@ -9,8 +9,8 @@ Usage: python -m benchmarks traces [TABLES] [FIRST_SEED] [CASES] [FILE]
        CASES: words of the cases to run, separated by |; default all. Seeds of a case begin a thousand apart.
        FILE: JSON lines, a table each; a run goes on where the file ends.
 
-Seeds from 10190000 to 10201999 led to choices in the code, such as how left-out traces are judged: they have no rates
-to tell. Those of docs/results-calibration.md have seeds from 10100000 to 10131999.
+Seeds from 10190000 to 10201999 led to choices in the code, such as how left-out traces are judged, and tell no
+rates. Those of docs/results-calibration.md have seeds from 10100000 to 10131999.
 
 Takes 40 minutes.
 """
