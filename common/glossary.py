@@ -16,6 +16,12 @@ TERMS = {  # a meaning has only terms that come later
     "Dubins path": "shortest path of bounded curvature between two poses: arcs of the smallest radius and "
     "straight lines",
     "domain": "the robots that a look-up table answers for",
+    "free run": "a prediction of a trace from its start, without another look at its readings",
+    "own number": "a number of a model that each trace, session or specimen has for itself (per=), such as the "
+    "start of a cup that cools",
+    "trace": "readings of one specimen in time, sorted; their noise may have a memory",
+    "memory of the noise": "the part of the noise that is slow, s, and the time τ after which a reading has "
+    "forgotten it by a factor of e",
     "verdict": "what a calibration concludes: no effect is missing, one is, a number is wrong, or the runs cannot "
     "decide",
     "preset": "a robot that comes with the package, such as paper-control",

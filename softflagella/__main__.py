@@ -9,7 +9,6 @@ import difflib
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from pathlib import Path
 
 from common.changes import RobotSource
 from common.commands import Call, Program, Subcommand, to_stderr
@@ -116,20 +115,18 @@ def _calibrate(
 
 
 @program.command("model")
-def _model(*, out: str = "falls.py") -> None:
+def _model(*, out: str | None = None, trace: bool = False) -> None:
     """Write a model to start from, for softflagella calibrate --model.
 
     Args:
-        out: PY.
+        out: PY, default falls.py, with --trace cups.py.
+        trace: of time series: cups that cool.
     """
-    from calibration.own_model.model_file import EXAMPLE
-    from common.files import write_text
+    from calibration.own_model.model_file import write_example
 
-    if Path(out).exists():
-        raise InputError(f"{out} is there already; give another name")
-    write_text(out, EXAMPLE.read_text().replace("falls.py", out))
-    print(f"-> {out}; python {out} makes a table for it, falls.csv. Then:")
-    print(f"softflagella calibrate falls.csv --model {out} --session round --specimen ball --out falls")
+    file, command = write_example(out, traces=trace)
+    print(f"-> {file}; python {file} makes a table for it, {command.split()[2]}. Then:")
+    print(command)
 
 
 @program.command("compare", plan="with")

@@ -13,9 +13,28 @@ import pandas as pd
 
 from calibration.own_model.declared import Model
 from common.errors import InputError, naming
+from common.files import write_text
 from common.reading import read_bytes
 
-EXAMPLE = Path(__file__).with_name("falls.txt")
+EXAMPLE, EXAMPLE_OF_TRACES = (Path(__file__).with_name(f"{name}.txt") for name in ("falls", "cups"))
+
+
+def write_example(file: str | Path | None = None, *, traces: bool = False) -> tuple[str, str]:
+    """Write a model to start from, of rows or of traces, to a new file; return its name and how to calibrate it.
+
+    Args:
+        file: default: falls.py, or cups.py of traces.
+
+    Raises:
+        InputError: the file is there already, or cannot be written.
+    """
+    example = EXAMPLE_OF_TRACES if traces else EXAMPLE
+    name = f"{example.stem}.py" if file is None else str(file)
+    if Path(name).exists():
+        raise InputError(f"{name} is there already; give another name")
+    text = example.read_text().replace(f"{example.stem}.py", name)
+    write_text(name, text)
+    return name, next(line.strip() for line in text.splitlines() if "softflagella calibrate" in line)
 
 
 def load_model(file: str | Path, table: str | Path) -> tuple[Model, str | Path | pd.DataFrame]:

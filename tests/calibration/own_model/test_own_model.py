@@ -209,6 +209,24 @@ def test_the_example_runs_from_the_command_to_the_report(
     assert "is there already" in capsys.readouterr().err
 
 
+def test_the_example_of_traces_runs_from_the_command_to_the_report(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Radiation is hidden in it; each cup has its own start."""
+    monkeypatch.chdir(tmp_path)
+    assert run_command(main, ["model", "--trace", "--out", "mugs.py"]) == 0
+    next_command = capsys.readouterr().out.splitlines()[-1]
+    runpy.run_path("mugs.py", run_name="__main__")
+    assert run_command(main, next_command.split()[1:]) == 0
+    assert "radiation" in capsys.readouterr().out
+    corrected = json.loads(Path("cups/corrected.json").read_text())
+    low, high = corrected["effects"]["emissivity"]["interval"]
+    assert low < 0.95 < high
+    assert json.loads(Path("cups/verdict.json").read_text())["verdict"] == "effect"
+    assert run_command(main, ["model", "--trace", "--out", "mugs.py"]) == 2
+    assert "is there already" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
