@@ -4,8 +4,8 @@
 
 is the fall from rest of d²s/dt² = g′ − b ds/dt − c (ds/dt)² with c = C_D ρ A/2m and b = C_1 ρ A U/2m, U = 10 m/s,
 begun at the time t_0 when the ball is let go. A sphere has C_D = 0.4 to 0.5 at Reynolds numbers of 10³ to 2·10⁵. A
-drag that is linear in the speed (C_1) and a wrong scale of the film (ε) are what else one may think of. The air lifts
-the ball and is accelerated with it: g′ = g (1 − α ρ/ρ_b)/(1 + α ρ/2ρ_b), by theory α = 1, and as much less drag.
+drag that is linear in the speed (C_1) and a wrong scale of the film (ε) are what else one may think of. The air
+lifts the ball and is accelerated with it: g′ = g (1 − α ρ/ρ_b)/(1 + α ρ/2ρ_b), by theory α = 1, with less drag.
 
 Ten balls, twice each, filmed at 15 Hz, by B. de Silva et al. (2020; MIT licence, see data/LICENCES.md).
 

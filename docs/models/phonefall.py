@@ -2,9 +2,9 @@
 
     dv/dt = −g − d(v),   d = b v |v/U|^n + c v |v|,   a = a_0 + a_1 t − d(v(t − s))
 
-v is the speed upwards, a what the accelerometer shows, nothing in free fall, U = 5 m/s. By theory n = 1: the drag is
-turbulent, not laminar. A turbulent drag beside the laminar one (c), a drift of the accelerometer (a_1), and one that
-is late (s) are what else one may think of.
+v is the speed upwards, a what the accelerometer shows, nothing in free fall, U = 5 m/s. By theory n = 1: the drag
+is turbulent, not laminar. A turbulent drag beside the laminar one (c), a drift of the accelerometer (a_1), and one
+that is late (s) are what else one may think of.
 
 Twenty-two drops and sixteen throws of one telephone, by F. Saliby (CC0, see data/LICENCES.md), arXiv 2410.14172.
 

@@ -4,8 +4,8 @@
 
 o_i = w_i (x_i − B) above the brim B, else nothing, u′ = u − u_0. All is in volts of the sensor of the lower tank,
 which shows x_2. The tanks are taken as equal, and w_i are the rates at which they overflow, the upper one into the
-lower one. Outlets below the level at which the sensor shows nothing (z), another exponent (ε), and a dead zone of the
-pump (u_0) are what else one may think of.
+lower one. Outlets below the level at which the sensor shows nothing (z), another exponent (ε), and a dead zone of
+the pump (u_0) are what else one may think of.
 
 The benchmark of M. Schoukens et al. (2016), one record to estimate and one to validate, as in github.com/forgi86/
 sysid-neural-structures-fitting (MIT licence, see data/LICENCES.md). Its authors say that both tanks overflow, and
