@@ -56,7 +56,7 @@ SETS = {
         "turbulent drag",
         "square: 1",
         "trace",
-        held_out="thrown",
+        held_out="third",
     ),
     "balldrop": Published(
         "balls from a bridge",
