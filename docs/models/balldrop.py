@@ -23,7 +23,7 @@ import pandas as pd
 
 import softflagella as sf
 
-GRAVITY, AIR = 9.8, 1.2  # m/s², kg/m³
+AIR = 1.2  # kg/m³
 SPEED = 10.0  # m/s
 SMALL = 1e-6  # 1/m, below which a drag is none
 
@@ -32,7 +32,7 @@ def fall(columns: Mapping[str, Any], p: Mapping[str, float]) -> dict[str, Any]:
     """Compute heights [m], (n,)."""
     mass, radius = columns["mass_g"] / 1e3, columns["circumference_cm"] / 200 / np.pi
     air = p["carried"] * AIR * 4 / 3 * np.pi * radius**3 / mass
-    gravity, heavier = GRAVITY * (1 - air) / (1 + air / 2), 1 + air / 2
+    gravity, heavier = p["gravity"] * (1 - air) / (1 + air / 2), 1 + air / 2
     share = AIR * np.pi * radius**2 / (2 * mass) / heavier
     b, c = share * p["linear_drag"] * SPEED, np.maximum(share * p["quadratic_drag"], SMALL)
     t = np.maximum(columns["t_s"] - p["release"], 0)
@@ -45,6 +45,7 @@ MODEL = sf.Model(
     fall,
     outputs={"h_m": sf.Output("height", unit="m", kind="difference")},
     numbers=[
+        sf.Number("gravity", 9.8, unit="m/s²", low=9, high=10.5, sigma="0.1 %"),
         sf.Number("height", 47, title="height at the start", unit="m", low=30, high=60, per="trace"),
         sf.Number("release", 0.1, title="time of release", unit="s", low=-0.5, high=1, per="trace"),
     ],
