@@ -99,6 +99,8 @@ def calibrated(name: str, table: str | Path | None = None) -> sf.ModelVerdict:
 def named(record: dict[str, Any]) -> str:
     """Say what a verdict names, in the order in which it was found, and the forms that would do as well."""
     found = [turn["named"] for turn in record["turns"] if turn["named"]] or [c["title"] for c in record["claims"]]
+    if not found:
+        return "nothing"
     forms = [form["title"] for form in record["forms"]]
     best = next((title for title in forms if record["nearest"]["at_theory"] and "theory" in title), found[-1])
     others = [title for title in forms if title != best]
