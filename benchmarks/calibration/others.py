@@ -2,8 +2,8 @@
 
 One table in Markdown, for docs/explanation/found.md: what was withheld, what is named, and the error on runs that
 were held out, before and after, by sessions and by conditions. Then a table of traces, with errors on traces that
-were held out, and the falls of 2019 with other laws of wall and inertia. SHIP.csv and CAN.csv, which have no licence,
-are read if they are given. With a PICTURE.png the errors of the first table are drawn.
+were held out, and the falls of 2019 with other laws of wall and inertia. SHIP.csv and CAN.csv, which have no
+licence, are read if they are given. With a PICTURE.png the errors of the first table are drawn.
 
 Usage: python -m benchmarks others [PICTURE.png] [SHIP.csv] [CAN.csv]
 
