@@ -67,7 +67,7 @@ MODEL = sf.Model(
         sf.Number("gain", 0.05, title="gain of the pump", unit="1/s", low=1e-3, high=1),
         sf.Number("upper_outlet", 0.05, title="outlet of the upper tank", unit="V^0.5/s", low=1e-3, high=1),
         sf.Number("lower_outlet", 0.05, title="outlet of the lower tank", unit="V^0.5/s", low=1e-3, high=1),
-        sf.Number("upper", 5, title="upper level at the start", unit="V", low=0.1, high=15, per="trace"),
+        sf.Number("upper", 5, title="upper level at the start", unit="V", low=0.1, high=20, per="trace"),
         sf.Number("lower", 5, title="lower level at the start", unit="V", low=0.1, high=12, per="trace"),
     ],
     effects=[

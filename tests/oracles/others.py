@@ -75,7 +75,7 @@ SETS = {
         "shiproll.py",
         None,
         "eddies, stiffening",
-        "stiffening 1.0 per rad²",
+        "stiffening 0.75 per rad²",
         "test",
         held_out="21338",
     ),
