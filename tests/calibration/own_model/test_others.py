@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+import softflagella as sf
+from calibration.own_model.model_file import load_model
 from tests.oracles.others import MODELS, SETS, calibrated, named
 from tests.shared import shared
 
@@ -108,6 +111,19 @@ def test_balls_from_a_bridge_lack_a_drag_that_differs_between_them() -> None:
 def test_a_ship_that_lacks_both_stiffening_and_eddies_is_not_explained_by_one() -> None:
     assert record("shiproll")["verdict"] == "unexplained"
     assert record("shiproll")["nearest_candidate"]["title"] == "stiffening by the sides"
+
+
+def test_the_stiffening_of_a_ship_is_that_of_a_simulation_of_its_hull() -> None:
+    """Of M. Alexandersson et al., without viscosity: 0.754 per rad² fits their fnpf_kvlcc2_rolldecay_0kn.csv."""
+    model, rows = load_model(MODELS / "shiproll.py", MODELS / "data/shiproll.csv")
+    stiffening = sf.Number("stiffening", 0.5, unit="1/rad²", low=-5, high=10)
+    declared = replace(model.without("stiffening"), numbers=[*model.numbers, stiffening])
+    verdict = sf.calibrate(rows, declared, trace="test", held_out="21338", progress=False)
+    low, high = verdict.facts["parameters"]["stiffening"]["interval"]
+    assert 0.65 < low < high < 0.8
+    assert (
+        verdict.facts["error_before"] > 2 * verdict.facts["error_after"]
+    )  # by a damping that grows with the angle
 
 
 def test_of_tanks_without_repeats_nothing_is_claimed() -> None:
