@@ -1,12 +1,13 @@
 """Measurements that others published, calibrated with the models of docs/models: what is named, errors held out.
 
 One table in Markdown, for docs/explanation/found.md: what was withheld, what is named, and the error on runs that
-were held out, before and after, by sessions and by conditions. Then the falls of 2019 with other laws of wall and
-inertia. SHIP.csv, which has no licence, is read if it is given. With a PICTURE.png the errors are drawn.
+were held out, before and after, by sessions and by conditions. Then a table of traces, with errors on traces that
+were held out, and the falls of 2019 with other laws of wall and inertia. SHIP.csv and CAN.csv, which have no
+licence, are read if they are given. With a PICTURE.png the errors of the first table are drawn.
 
-Usage: python -m benchmarks others [PICTURE.png] [SHIP.csv]
+Usage: python -m benchmarks others [PICTURE.png] [SHIP.csv] [CAN.csv]
 
-Takes 30 seconds.
+Takes three minutes.
 """
 
 from __future__ import annotations
@@ -69,10 +70,27 @@ def percent(verdict: sf.ModelVerdict, *errors: float) -> list[float]:
     return [100 * error / mean for error in errors]
 
 
-def main(picture: str = "", ship: str = "") -> None:
-    """Print the table; draw the picture."""
-    names = [name for name in SETS if ship or SETS[name].table]
-    verdicts = {name: calibrated(name, None if SETS[name].table else ship) for name in names}
+def print_traces(verdicts: Mapping[str, sf.ModelVerdict]) -> None:
+    """Print the table of sets of traces, with errors in their units."""
+    print(heading("traces", "withheld", "verdict", "named", "held-out traces", "noise", "numbers", "known"))
+    for name, verdict in verdicts.items():
+        record, measured = verdict.facts, SETS[name]
+        unit = next(iter(verdict.model.outputs.values())).unit
+        noise = f"{record['noise_ceiling']:.3g} {unit}" if verdict.runs.noise_known else "unknown"
+        shared = [title for title, value in verdict.corrected.items() if not isinstance(value, Mapping)]
+        print(row(
+            measured.title, measured.withheld, verdict.verdict, named(record),
+            f"{record['error_before']:.3g} → {record['error_after']:.3g} {unit}", noise,
+            ", ".join(f"{title} {verdict.corrected[title]:.3g}" for title in shared), measured.known,
+        ))  # fmt: skip
+
+
+def main(picture: str = "", ship: str = "", can: str = "") -> None:
+    """Print the tables; draw the picture."""
+    beside = {"ship": ship, "filmcan": can}
+    names = [name for name in SETS if SETS[name].table or beside[name]]
+    all_verdicts = {name: calibrated(name, beside.get(name)) for name in names}
+    verdicts = {name: verdict for name, verdict in all_verdicts.items() if SETS[name].trace is None}
     print(heading("set", "withheld", "named", "sessions, %", "conditions, %", "noise, %", "number", "known"))
     drawn = {}
     for name, verdict in verdicts.items():
@@ -90,6 +108,7 @@ def main(picture: str = "", ship: str = "") -> None:
             measured.title, measured.withheld, named(record), f"{before} → {after}", f"{b} → {a}",
             left if verdict.runs.noise_known else "unknown", ", ".join(numbers), measured.known,
         ))  # fmt: skip
+    print_traces({name: verdict for name, verdict in all_verdicts.items() if name not in verdicts})
     compare_laws()
     if picture:
         draw(drawn, picture)

@@ -20,6 +20,9 @@ class Published(NamedTuple):
     session: str | None
     withheld: str
     known: str  # from theory, or from another instrument
+    trace: str | None = None  # column with the traces of readings
+    specimen: str | None = None
+    held_out: str | None = None  # session, or column
 
 
 SETS = {
@@ -45,6 +48,41 @@ SETS = {
         "drag of a sphere",
         "C_D 0.4 to 0.5",
     ),
+    "phonefall": Published(
+        "fall of a telephone",
+        "phonefall.csv",
+        "phonefall.py",
+        None,
+        "turbulent drag",
+        "square: 1",
+        "trace",
+        held_out="third",
+    ),
+    "balldrop": Published(
+        "balls from a bridge",
+        "balldrop.csv",
+        "balldrop.py",
+        None,
+        "drag of a sphere",
+        "C_D 0.4 to 0.5",
+        "trace",
+        "ball",
+        "second",
+    ),
+    "shiproll": Published(
+        "roll of a ship",
+        "shiproll.csv",
+        "shiproll.py",
+        None,
+        "eddies, stiffening",
+        "stiffening 0.75 per rad²",
+        "test",
+        held_out="21338",
+    ),
+    "tanks": Published(
+        "two tanks", "tanks.csv", "tanks.py", None, "overflow of both", "both overflow", "record", held_out="val"
+    ),
+    "filmcan": Published("water in a film can", "", "filmcan.py", None, "heat of the can", "10 J/K", "trace"),
 }
 
 
@@ -52,12 +90,17 @@ def calibrated(name: str, table: str | Path | None = None) -> sf.ModelVerdict:
     """Calibrate one of SETS; a table that is not in the project is given."""
     measured = SETS[name]
     model, rows = load_model(MODELS / measured.model, table or MODELS / "data" / measured.table)
-    return sf.calibrate(rows, model, session=measured.session, progress=False)
+    return sf.calibrate(
+        rows, model, session=measured.session, specimen=measured.specimen, trace=measured.trace,
+        held_out=measured.held_out, progress=False,
+    )  # fmt: skip
 
 
 def named(record: dict[str, Any]) -> str:
     """Say what a verdict names, in the order in which it was found, and the forms that would do as well."""
     found = [turn["named"] for turn in record["turns"] if turn["named"]] or [c["title"] for c in record["claims"]]
+    if not found:
+        return "nothing"
     forms = [form["title"] for form in record["forms"]]
     best = next((title for title in forms if record["nearest"]["at_theory"] and "theory" in title), found[-1])
     others = [title for title in forms if title != best]
