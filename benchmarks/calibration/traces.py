@@ -10,7 +10,7 @@ Usage: python -m benchmarks traces [TABLES] [FIRST_SEED] [CASES] [FILE]
        FILE: JSON lines, a table each; a run goes on where the file ends.
 
 Seeds from 10190000 to 10201999 led to choices in the code, such as how left-out traces are judged, and tell no
-rates. Those of docs/results-calibration.md have seeds from 10100000 to 10131999.
+rates. Those of docs/results-calibration.md have seeds from 10120000 to 10141999.
 
 Takes 40 minutes.
 """
