@@ -327,11 +327,13 @@ def draw_sizes(form: Hypothesis) -> Figure:
 def draw_corner(result: Findings) -> Figure | None:
     """Draw samples of numbers and effects in pairs, and alone on the diagonal; None where fewer than two are free.
 
-    Numbers that were given to a tolerance are left out, and of the others all but the first _CORNER.
+    Numbers that were given to a tolerance, or are a group's own, are left out, and of the others all but the first
+    _CORNER.
     """
     forms = open_forms(result)
     samples = draw_samples(forms, _SAMPLES, seed=0)
-    fitted = {p.name: p for refit in forms.values() for p in refit.fitted if p.sigma is None}
+    every = (p for refit in forms.values() for p in refit.fitted)
+    fitted = {p.name: p for p in every if p.sigma is None and not p.of_group}
     free = [p for p in fitted.values() if _can_be_drawn(samples[p.name])][:_CORNER]
     if len(free) < 2:
         return None

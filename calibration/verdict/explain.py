@@ -154,8 +154,9 @@ def _forecast(study: Study, began: Work, of_first_tests: float, of_a_test: float
         ends = f"; the search ends after about {_duration(left)}" * (left < math.inf)
         if study.progress:
             print(
-                f"there is more than noise: {count} effects to fit take {_duration(single)} of processor time; if "
-                f"none explains the runs, pairs follow, {_duration(FIRST * (of_first_tests + single))} at most, "
+                f"there is more than noise: {count} effect{'s' * (count > 1)} to fit take{'s' * (count == 1)} "
+                f"{_duration(single)} of processor time; if none explains the runs, pairs follow, "
+                f"{_duration(FIRST * (of_first_tests + single))} at most, "
                 f"mostly much less{ends}",
                 file=sys.stderr,
             )
