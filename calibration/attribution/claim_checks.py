@@ -1,12 +1,12 @@
 """Checks of a claim: could something outside the catalogue look like it, and does it carry over to other runs?
 
 What is outside is not known. It is drawn: the signal of an effect times exp(g), with g a smooth random function of
-the runs' inputs (Gaussian process, correlation length one standard deviation, two for traces, standard deviation
-0.5). So it acts on the same outputs, and depends on N, l and ω in another way. The nuisance parameters and the
-coefficients absorb what they can. Of the rest, the claim absorbs a share a (the absorbable share). A departure
-that passes for a claim of strength Λ (standard deviations) leaves Λ √(1/a − 1). Less than `SEEN` is not noticed.
-The *imitability index* of a claim, or of a pair, is the share of draws that it would not notice. The absorbable
-shares depend on the design alone, not on what was measured.
+the runs' inputs (Gaussian process, correlation length one standard deviation, along the time of traces two,
+standard deviation 0.5). So it acts on the same outputs, and depends on N, l and ω in another way. The nuisance
+parameters and the coefficients absorb what they can. Of the rest, the claim absorbs a share a (the absorbable
+share). A departure that passes for a claim of strength Λ (standard deviations) leaves Λ √(1/a − 1). Less than
+`SEEN` is not noticed. The *imitability index* of a claim, or of a pair, is the share of draws that it would not
+notice. The absorbable shares depend on the design alone, not on what was measured.
 
 Something outside the catalogue can look like an effect at some runs. It depends on the settings in another way,
 so that the size which fits short tails, say, is wrong for long ones. In the *transfer test* the model with the
@@ -38,7 +38,7 @@ from common.arrays import Flags, Floats
 SEEN = 6.0  # standard deviations of a remainder that the tests notice nearly always
 _DRAWS = 200
 _SPREAD = 0.5  # of ln of a signal
-_ALONG_TRACES = 2.0  # correlation length: what imitates an effect along a trace differs from it slowly
+_ALONG_TRACES = 2.0  # correlation length in time: what imitates an effect along a trace differs from it slowly
 _ENOUGH = 2  # values a parameter
 _MOST = 0.999  # p-value of the transfer test; 1 means that it was not made
 
@@ -89,8 +89,9 @@ def imitability(shares: Floats, strength: float) -> float:
 def deformations(runs: Runs, used: Flags, count: int, seed: int) -> Floats:
     """Draw exp(g) at the runs in `used`, (n', count)."""
     spread = runs.inputs[used].std(0)
-    length = 1.0 if runs.trace is None else _ALONG_TRACES
-    factor = kernel_factor(runs.inputs[used] / np.where(spread > 0, length * spread, 1.0))
+    if runs.trace is not None:
+        spread[-1] *= _ALONG_TRACES
+    factor = kernel_factor(runs.inputs[used] / np.where(spread > 0, spread, 1.0))
     return np.asarray(np.exp(_SPREAD * factor @ np.random.default_rng(seed).normal(size=(factor.shape[1], count))))
 
 

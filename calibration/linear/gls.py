@@ -77,7 +77,7 @@ class Groups(NamedTuple):
         return cls(order, np.argsort(order), first, count, np.repeat(np.arange(len(count)), count))
 
     def add(self, table: Floats) -> Floats:
-        """Add up the runs of each condition, (..., n, k) to (..., c, k)."""
+        """Add up runs in their order, those of each condition, (..., n, k) to (..., c, k)."""
         return np.asarray(np.add.reduceat(table, self.first, axis=-2))
 
 

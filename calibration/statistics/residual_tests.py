@@ -176,7 +176,7 @@ class _Tester:
         self.names, self.F = features(data, used)
         self.F = self.absorbed.project(data.whitened(self.F)[used]) * scale[:, None]
         self.conditions = Groups.of(data.condition[used])
-        self.condition_sizes = self.conditions.add(scale[:, None] ** 2)  # (c, 1)
+        self.condition_sizes = self.conditions.add(scale[self.conditions.order, None] ** 2)  # (c, 1)
         self.F_means = self.design.average(self.F)  # (s, f)
         self.FJ = np.einsum("nf,nkp->fkp", self.F, self.J, optimize=True)
         self.FJ_means = np.einsum("sf,skp->sfkp", self.F_means, self.design.means[..., : self.p])
@@ -198,7 +198,7 @@ class _Tester:
         )
         white = residual * self.design.scale[:, None] - np.einsum("nkp,bp->bnk", self.J, step, optimize=True)
         white = self.design.shrink(white @ np.swapaxes(root, -1, -2), session_ratio)
-        sums = self.conditions.add(white * self.design.scale[:, None])
+        sums = self.conditions.add((white * self.design.scale[:, None])[:, self.conditions.order])
         lack = (sums**2 / self.condition_sizes).sum((-1, -2))
         kernel = ((self.smooth.T @ white) ** 2).sum((-1, -2))
         shapes = self._shapes(covariance, white, root, session_ratio)
