@@ -53,9 +53,9 @@ MODEL = sf.Model(
 )  # fmt: skip
 
 
-def readings(count: int, traces: int, seed: int = 0, **planted: float) -> pd.DataFrame:
+def readings(count: int, traces: int, planted: Mapping[str, float]) -> pd.DataFrame:
     """Draw a table of `count` readings."""
-    rng, each = np.random.default_rng(seed), count // traces
+    rng, each = np.random.default_rng(0), count // traces
     time_s = _HOUR * np.arange(1, each + 1) / each
     kept = np.exp(-time_s[0] / _FORGETS)
     tables = []
@@ -73,8 +73,9 @@ def readings(count: int, traces: int, seed: int = 0, **planted: float) -> pd.Dat
 
 def main(count: str = "100000", traces: str = "50") -> None:
     print(heading("planted", "readings", "verdict", "processor time", "memory of the process"))
-    for planted in ({}, {"lag": 30.0}):
-        table = readings(int(count), int(traces), **planted)
+    cases: tuple[dict[str, float], ...] = ({}, {"lag": 30.0})
+    for planted in cases:
+        table = readings(int(count), int(traces), planted)
         began = time.process_time()
         verdict = sf.calibrate(table, MODEL, trace="cup", progress=False)
         seconds, peak = time.process_time() - began, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
