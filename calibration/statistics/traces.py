@@ -48,7 +48,7 @@ _ABSORBED = 1 / 3  # most columns of a trace without repeats, over its readings
 
 @dataclass(frozen=True)
 class Whitened(Wrapped):
-    """A model of readings of traces, white along these."""
+    """A model of readings of traces, white along these. It proposes no next runs: a reading is not made alone."""
 
     memory: Memory
 
@@ -78,14 +78,6 @@ class Whitened(Wrapped):
 
     def _white_sets(self, predictions: Floats) -> Floats:
         return np.moveaxis(self.memory.whiten(np.moveaxis(predictions, 0, -1)), -1, 0)
-
-    def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
-        """Return the start as it is: it comes from a fit."""
-        return start
-
-    def possible(self) -> tuple[Any, list[dict[str, Any]]]:
-        """Return no runs: a reading alone cannot be made again."""
-        return self, []
 
 
 def whiten_traces(study: Study, start: dict[str, float]) -> tuple[Study, dict[str, float]]:

@@ -28,6 +28,7 @@ from scipy.interpolate import CubicSpline
 from scipy.sparse.csgraph import connected_components
 from scipy.special import bdtrc, fdtrc, ndtri
 
+from calibration.linear.memory import Memory
 from calibration.table.between_repeats import SHARE_OF_LEVEL, Difference, span
 from calibration.table.runs import Runs
 from common.arrays import Flags, Floats, Integers
@@ -167,13 +168,15 @@ def _tests(groups: list[_Group]) -> list[tuple[_Group, Floats, Floats, Floats]]:
     freedom = sum((len(g.traces) - 1) * (len(g.time) - g.own.shape[1]) for g in groups) - 1
     square, penalty, gains, tested = np.zeros((1, 1, 1)), np.zeros((1, 1, 1)), [], []
     for g in groups:
-        m, q, root = len(g.traces), g.own.shape[1], _roots(g.time)
-        white = np.linalg.solve(root, np.column_stack([g.own, g.shapes, g.y.T]))
+        m, q, memories = len(g.traces), g.own.shape[1], _memories(g.time)
+        columns = np.column_stack([g.own, g.shapes, g.y.T])
+        white = np.stack([memory.whiten(columns) for memory in memories])  # (K, T, …)
         basis, triangle = np.linalg.qr(white[..., :q])
         left = white[..., q:] - basis @ (basis.mT @ white[..., q:])
         shapes, y = left[..., :-m], left[..., -m:]
         length = np.maximum((shapes**2).sum(1, keepdims=True) * (m - 1) / m, _TINY)
-        logarithms = sum(np.log(np.abs(np.diagonal(each, axis1=1, axis2=2))).sum(1) for each in (root, triangle))
+        logarithms = np.log(np.abs(np.diagonal(triangle, axis1=1, axis2=2))).sum(1)
+        logarithms += [memory.log_determinant / 2 for memory in memories]
         square = square + (y**2).sum((1, 2), keepdims=True)
         penalty = penalty + 2 * (m - 1) * np.reshape(logarithms, (-1, 1, 1))
         gains.append(((y.mT @ shapes) ** 2 / length, np.log(length)))
@@ -187,12 +190,11 @@ def _tests(groups: list[_Group]) -> list[tuple[_Group, Floats, Floats, Floats]]:
     return tested
 
 
-def _roots(time: Floats) -> Floats:
-    """Compute the Cholesky factors of R at the times (T,), for every w and τ, (K, T, T)."""
-    apart = np.abs(time[:, None] - time) / np.median(np.diff(time))
-    pairs = np.array([(w, tau) for w in _WHITE for tau in (_MEMORY if w < 1 else _MEMORY[:1])])
-    w, tau = pairs.T[:, :, None, None]
-    return np.asarray(np.linalg.cholesky(w * np.eye(len(time)) + (1 - w) * np.exp(-apart / tau)))
+def _memories(time: Floats) -> list[Memory]:
+    """List R at the times (T,), for every w and τ."""
+    one, step = np.zeros(len(time), dtype=np.int64), float(np.median(np.diff(time)))
+    pairs = [(w, tau) for w in _WHITE for tau in (_MEMORY if w < 1 else _MEMORY[:1])]
+    return [Memory(one, time, 1 - w, step * tau) for w, tau in pairs]
 
 
 def _difference(runs: Runs, group: _Group, j: int, s: int, F: float, p: float, alike: Integers) -> Difference:
