@@ -73,8 +73,12 @@ def read_runs_of(
     with naming(source):
         table = open_table(source)
         session = roles.session or ("session" if "session" in table else roles.trace)
-        if (roles.trace is None) != (model.time is None):
-            raise InputError("a table of traces needs the column of their names, trace=, and a model with time=")
+        if model.time and not roles.trace:
+            raise InputError(f"a table of traces needs the column of their names, trace=; time is {model.time}")
+        if roles.trace and not model.time:
+            raise InputError(
+                f'trace {roles.trace} needs a model with a column of the time: sf.Model(…, time="t_s")'
+            )
         result = _read(table, model, roles._replace(session=session))
         if len(result.runs.trace_names) == 1:
             raise InputError("the table has one trace only, so none can be held out; give several, best repeats")

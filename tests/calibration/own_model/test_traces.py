@@ -12,6 +12,9 @@ import softflagella as sf
 from common.errors import InputError
 from tests.oracles.cups import MODEL, RATE, cup, cups
 
+ROWS = sf.Model(
+    lambda columns, p: {"y": p["k"] * columns["x"]}, outputs={"y": sf.Output("y")}, numbers=[sf.Number("k", 1.0)]
+)
 TRACE = {"trace": "cup", "progress": False}
 
 
@@ -173,6 +176,9 @@ def test_tables_of_traces_that_cannot_be_used():
     assert "trace 'cup 0 of day 0' goes back in time in row 5" in fault(back)
     assert "one trace only" in fault(table[table["cup"] == "cup 0 of day 0"])
     assert "needs the column of their names, trace=" in fault(table, trace=None)
+    assert "trace x needs a model with a column of the time" in fault(
+        pd.DataFrame({"x": [1.0, 2, 3, 4], "y": [1.0, 2, 3, 4]}), ROWS, trace="x"
+    )
     with pytest.raises(InputError, match=r"needs the column of the time: sf\.Model"):
         replace(MODEL, time=None)
     with pytest.raises(InputError, match="per 'cup'; give one of trace, session, specimen"):
