@@ -15,6 +15,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from calibration.attribution.hypothesis import Hypothesis, SetErrors
 from calibration.attribution.rules import RULES, Stage, Trial, judge
 from calibration.statistics.fit import Fit, birge
@@ -60,7 +62,7 @@ def held_out_errors(study: Study, predictions: dict[str, Floats], before: Fit, f
         rms={name: rms for name, (rms, _) in stated.items()},
         by_output={name: each for name, (_, each) in stated.items()},
         after_interval=error_interval(runs, final.prediction, test, study.seed),
-        noise=before.noise.rms,
+        noise=float(np.sqrt((runs.deviations(before.noise.run_covariance, test) ** 2).mean())),
         p_value=held_out_p_value(final, runs, test, seed=study.seed + 3),
         gain_interval=gain_interval(runs, before.prediction, final.prediction, test, study.seed)
         if claimed

@@ -386,7 +386,7 @@ def _outputs(runs: Runs) -> dict[str, Any]:
 
 def _data(result: Findings) -> dict[str, Any]:
     runs = result.runs
-    scatter = np.sqrt(np.diag(result.base.noise.run_covariance)).tolist()
+    scatter = runs.deviations(result.base.noise.run_covariance).tolist()
     settings = runs.settings.items()
     return {
         "outputs": list(runs.outputs),

@@ -296,7 +296,7 @@ class NormalEquations:
     def _about_common(self, means: Floats) -> Floats:
         """Take the mean over all sessions from their means (..., s k, m), for each output."""
         each = means.reshape(*means.shape[:-2], len(self.sizes), self.outputs, means.shape[-1])
-        along = np.sqrt(self.sizes / self.sizes.sum())
+        along = np.sqrt(self.sizes / max(self.sizes.sum(), _NOTHING))
         common = np.einsum("s,...skm->...km", along, each)
         return np.asarray((each - along[:, None, None] * common[..., None, :, :]).reshape(means.shape))
 
@@ -336,7 +336,7 @@ class NormalEquations:
         session_ratio = np.zeros((*batch, k))
         if not passes:
             return session_ratio
-        means, total = self._about_common(self.means), self.sizes.sum()
+        means, total = self._about_common(self.means), max(float(self.sizes.sum()), _NOTHING)
         columns = means[..., :-1]
         for count in range(passes if freedom else 0):
             step, covariance = solve_normal(self.at(session_ratio)) if count else self._without_scatter

@@ -583,7 +583,7 @@ def _inflation(repeats: float, outputs: int) -> float:
 
 def _freedom(products: NormalEquations, session_ratio: Floats, count: int) -> Floats:
     """Estimate the degrees of freedom of the parameters' variances, (p,)."""
-    least = 1 / products.sizes.mean()
+    least = 1 / max(products.sizes.mean(), 1.0)
     steps = 0.01 * session_ratio + 1e-3 * least
     session_ratios = np.vstack([session_ratio, session_ratio + np.diag(steps)])
     variances = [np.diag(products.covariance(s))[:count] for s in session_ratios]

@@ -172,9 +172,9 @@ class _Tester:
         inputs = data.inputs[used]
         spread = inputs.std(0)
         inputs = (data.inputs - inputs.mean(0)) / np.where(spread > 0, spread, 1.0)
-        self.smooth = data.whitened(kernel_factor(inputs))[used] * scale[:, None]  # (n', r)
+        self.smooth = data.white_features(kernel_factor(inputs))[used] * scale[:, None]  # (n', r)
         self.names, self.F = features(data, used)
-        self.F = self.absorbed.project(data.whitened(self.F)[used]) * scale[:, None]
+        self.F = self.absorbed.project(data.white_features(self.F)[used]) * scale[:, None]
         self.conditions = Groups.of(data.condition[used])
         self.condition_sizes = self.conditions.add(scale[self.conditions.order, None] ** 2)  # (c, 1)
         self.F_means = self.design.average(self.F)  # (s, f)

@@ -74,6 +74,15 @@ class Inputs(NamedTuple):
         return dict(zip(columns, np.broadcast_arrays(*columns.values()), strict=True))
 
 
+class Simulated(NamedTuple):
+    """Runs of P parameter sets, and the distinct robots that are simulated for them."""
+
+    inputs: Inputs
+    columns: dict[str, Floats]  # of the distinct robots, for the simulator
+    same: Integers  # (P, n) the robot of each run
+    direction: Floats  # (P, n) of the motor that is simulated: 1, unless left and right turns differ
+
+
 class Solver(NamedTuple):
     """Functions for motions and derivatives, like `steady_columns` and `sensitivity_columns`."""
 
@@ -143,10 +152,7 @@ class SwimmerModel:
         With `lookup` the look-up table is used, not the simulator. That is good for a first guess only, because
         the errors of the table would look like physics.
         """
-        inputs = self.inputs_of_runs(sets)
-        columns = inputs.columns
-        columns["omega_bar"] = columns["omega_bar"] * self._direction(columns)
-        distinct, same = self._simulated(columns)
+        inputs, distinct, same, _ = self.simulated(sets)
         if lookup is not None:
             found: Mapping[str, Floats] = lookup.query(distinct)
         else:
@@ -156,6 +162,14 @@ class SwimmerModel:
         if not np.isfinite(table).all():
             raise InputError("the simulation of a run broke down; check the robot and the run's motor speed")
         return self.runs.compared(table)
+
+    def simulated(self, sets: Sequence[Parameters]) -> Simulated:
+        """Choose the robots that are simulated for P parameter sets."""
+        inputs = self.inputs_of_runs(sets)
+        columns = inputs.columns
+        direction = self._direction(columns)
+        columns["omega_bar"] = columns["omega_bar"] * direction
+        return Simulated(inputs, *self._simulated(columns), direction)
 
     def linearised(
         self, at: Parameters, along: Sequence[Parameter], *, title: str = "", quick: bool = False

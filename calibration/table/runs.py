@@ -96,6 +96,14 @@ class Runs:
         """Whiten a table (n, …) along traces."""
         return table if self.memory is None else self.memory.whiten(table)
 
+    def white_features(self, table: Floats) -> Floats:
+        """Whiten features (n, f), which an output may follow, along traces."""
+        return self.whitened(table)
+
+    def deviations(self, run_covariance: Floats, rows: Flags | slice = slice(None)) -> Floats:
+        """Compute the standard deviation (k,) that the outputs of some rows have by noise alone, from S (k, k)."""
+        return np.sqrt(np.diag(run_covariance))
+
     def left_out(self, rows: Flags) -> Flags:
         """Return runs (n,) less those to which a group's own numbers are fitted where it is left out."""
         return rows if self.heads is None else rows & ~self.heads

@@ -1,0 +1,236 @@
+"""The noise of the poses of a swim: a camera's, with a memory, and steps by which the robot itself is moved.
+
+A pose is that of the model, and beside it
+
+    white noise       of each reading, w² of places, w² of headings,
+    slow noise        Ornstein-Uhlenbeck, s² exp(−|Δt|/τ): lights, waves, a marker that is seen askew,
+    random steps      q² at each flip of the motor, of place and heading: what disturbs a robot adds up. A step of
+                      the heading carries all of the path that follows, as a lever.
+
+This is a linear state space of six numbers, the deviation of the pose and the slow noise. So the innovations of a
+Kalman filter, each over its standard deviation, are white: L⁻¹ y with the Cholesky factor L of the covariance of
+all poses, in linear time. With q = 0 poses are compared as they are, with large q their changes from flip to flip
+are. Each part of a swim starts from a pose that is fitted.
+
+The variances have the largest restricted likelihood of what the richest model leaves, with all of its columns
+projected out (Patterson and Thompson 1971). What no effect can describe is noise then, mostly of the steps.
+Source of the filter: e.g. Anderson and Moore (1979), chapter 5.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import minimize
+
+from common.arrays import Flags, Floats, Integers
+from sim.jit import compiled
+
+_LEAST, _MOST = 1e-4, 1e3  # of standard deviations, over the scatter of neighbouring poses
+_RIDGE = 1e-9  # of the products of columns, each of length 1
+_STARTS = ((1.0, 1.0, 0.1), (1.0, 0.1, 1.0))  # white, slow, steps, over the scatter of neighbouring poses
+
+
+class Sizes(NamedTuple):
+    """Standard deviations of places and of headings, each (2,), and τ [s]."""
+
+    white: Floats
+    slow: Floats
+    step: Floats
+    tau: float
+
+
+@dataclass(frozen=True)
+class PoseNoise:
+    """The covariance of n poses, as a filter."""
+
+    part: Integers  # (n,) of swims, sorted; each starts from a pose of its own
+    time: Floats  # (n,) [s]
+    flips: Integers  # (n,) of the motor since the pose before
+    moved: Floats  # (n, 2) place since the pose before, in the lab
+    sizes: Sizes
+
+    def whiten(self, table: Floats) -> Floats:
+        """Compute L⁻¹ of a table (n, 3, …)."""
+        return self._run(table, colour=False)
+
+    def colour(self, table: Floats) -> Floats:
+        """Compute L of a table (n, 3, …)."""
+        return self._run(table, colour=True)
+
+    def of(self, rows: Flags) -> PoseNoise:
+        """Take some poses (n,): all up to some time of each part."""
+        return replace(self, part=self.part[rows], time=self.time[rows], flips=self.flips[rows], moved=self.moved[rows])
+
+    @property
+    def log_determinant(self) -> float:
+        """Compute ln |L|."""
+        return float(np.log(np.diagonal(self._filter[1], axis1=1, axis2=2)).sum())
+
+    @cached_property
+    def _decay(self) -> Floats:
+        """The share of the slow noise that is left from the pose before, (n,); below 0 where a part begins."""
+        same = np.append(False, np.diff(self.part) == 0)
+        return np.where(same, np.exp(-np.diff(self.time, prepend=self.time[0]) / self.sizes.tau), -1.0)
+
+    @cached_property
+    def _filter(self) -> tuple[Floats, Floats]:
+        """Gains (n, 6, 3), and Cholesky factors (n, 3, 3) of the covariance of the innovations."""
+        white, slow, step = (np.array([s[0], s[0], s[1]]) ** 2 for s in self.sizes[:3])
+        return _gains(self._decay, self.flips.astype(float), self.moved, white, slow, step)
+
+    def _run(self, table: Floats, *, colour: bool) -> Floats:
+        flat = np.ascontiguousarray(table, dtype=float).reshape(len(table), 3, -1)
+        return np.asarray(_filtered(flat, *self._filter, self._decay, self.moved, colour)).reshape(table.shape)
+
+
+@compiled
+def _gains(decay, flips, moved, white, slow, step):  # type: ignore[no-untyped-def]
+    """Run the covariance of the state along the poses, see `PoseNoise._filter`."""
+    n = len(decay)
+    gains, roots = np.zeros((n, 6, 3)), np.zeros((n, 3, 3))
+    P, S, ahead = np.zeros((6, 6)), np.zeros((3, 3)), np.zeros((6, 3))
+    for i in range(n):
+        if decay[i] < 0:
+            for a in range(6):
+                for b in range(6):
+                    P[a, b] = 0.0
+            for a in range(3):
+                P[3 + a, 3 + a] = slow[a]
+        else:
+            for a in range(3):
+                P[a, a] += flips[i] * step[a]
+            for b in range(6):  # a turned robot goes on in another direction
+                P[0, b] -= moved[i, 1] * P[2, b]
+                P[1, b] += moved[i, 0] * P[2, b]
+            for a in range(6):
+                P[a, 0] -= moved[i, 1] * P[a, 2]
+                P[a, 1] += moved[i, 0] * P[a, 2]
+            for a in range(3):
+                for b in range(6):
+                    P[3 + a, b] *= decay[i]
+                for b in range(6):
+                    P[b, 3 + a] *= decay[i]
+                P[3 + a, 3 + a] += (1 - decay[i] ** 2) * slow[a]
+        for a in range(6):
+            for b in range(3):
+                ahead[a, b] = P[a, b] + P[a, 3 + b]
+        for a in range(3):
+            for b in range(3):
+                S[a, b] = ahead[a, b] + ahead[3 + a, b]
+            S[a, a] += white[a]
+        for a in range(3):  # Cholesky
+            for b in range(a + 1):
+                total = S[a, b]
+                for c in range(b):
+                    total -= roots[i, a, c] * roots[i, b, c]
+                roots[i, a, b] = math.sqrt(max(total, 1e-300)) if a == b else total / roots[i, b, b]
+        for a in range(6):  # ahead S⁻¹
+            for b in range(3):
+                total = ahead[a, b]
+                for c in range(b):
+                    total -= gains[i, a, c] * roots[i, b, c]
+                gains[i, a, b] = total / roots[i, b, b]
+            for b in range(2, -1, -1):
+                total = gains[i, a, b]
+                for c in range(b + 1, 3):
+                    total -= gains[i, a, c] * roots[i, c, b]
+                gains[i, a, b] = total / roots[i, b, b]
+        for a in range(6):
+            for b in range(6):
+                for c in range(3):
+                    P[a, b] -= gains[i, a, c] * ahead[b, c]
+        for a in range(6):
+            for b in range(a):
+                mean = (P[a, b] + P[b, a]) / 2
+                P[a, b] = mean
+                P[b, a] = mean
+    return gains, roots
+
+
+@compiled
+def _filtered(table, gains, roots, decay, moved, colour):  # type: ignore[no-untyped-def]
+    """Turn poses (n, 3, m) into innovations over their standard deviations, or back."""
+    n, _, m = table.shape
+    result, state, e = np.empty((n, 3, m)), np.zeros((6, m)), np.zeros((3, m))
+    for i in range(n):
+        if decay[i] < 0:
+            for a in range(6):
+                for j in range(m):
+                    state[a, j] = 0.0
+        else:
+            for j in range(m):
+                state[0, j] -= moved[i, 1] * state[2, j]
+                state[1, j] += moved[i, 0] * state[2, j]
+            for a in range(3, 6):
+                for j in range(m):
+                    state[a, j] *= decay[i]
+        if colour:
+            for a in range(3):
+                for j in range(m):
+                    total = 0.0
+                    for c in range(a + 1):
+                        total += roots[i, a, c] * table[i, c, j]
+                    e[a, j] = total
+                    result[i, a, j] = total + state[a, j] + state[3 + a, j]
+        else:
+            for a in range(3):
+                for j in range(m):
+                    e[a, j] = table[i, a, j] - state[a, j] - state[3 + a, j]
+                    total = e[a, j]
+                    for c in range(a):
+                        total -= roots[i, a, c] * result[i, c, j]
+                    result[i, a, j] = total / roots[i, a, a]
+        for a in range(6):
+            for c in range(3):
+                for j in range(m):
+                    state[a, j] += gains[i, a, c] * e[c, j]
+    return result
+
+
+def estimate_noise(rough: PoseNoise, residual: Floats, columns: Floats) -> PoseNoise:
+    """Estimate the sizes of the noise from what a model leaves.
+
+    Args:
+        rough: its parts, times and flips; its τ is where the search begins.
+        residual: (n, 3).
+        columns: (n, 3, m) by which the residual may change to any amount.
+    """
+    lengths = np.sqrt((columns**2).sum((0, 1)))
+    table = np.concatenate([columns[..., lengths > 0] / lengths[lengths > 0], residual[..., None]], -1)
+    neighbours = np.diff(residual, axis=0)[np.diff(rough.part) == 0]
+    scatter = np.array([np.sqrt(np.mean(neighbours[:, :2] ** 2) / 2), np.sqrt(np.mean(neighbours[:, 2] ** 2) / 2)])
+    step = float(np.median(np.diff(rough.time)[np.diff(rough.part) == 0]))
+    longest = float(np.ptp(rough.time)) / 3
+
+    def noise(at: Floats) -> PoseNoise:
+        white, slow, steps = (scatter * np.exp(at[i : i + 2]) for i in (0, 2, 4))
+        return replace(rough, sizes=Sizes(white, slow, steps, math.exp(at[6])))
+
+    def cost(at: Floats) -> float:
+        tried = noise(at)
+        white = tried.whiten(table).reshape(-1, table.shape[-1])
+        products = white.T @ white
+        size = np.sqrt(np.diag(products)[:-1])
+        inner = products[:-1, :-1] / np.outer(size, size) + _RIDGE * np.eye(len(size))
+        across = products[:-1, -1] / size
+        left = products[-1, -1] - across @ np.linalg.solve(inner, across)
+        determinant = np.linalg.slogdet(inner)[1] + 2 * np.log(size).sum()
+        return float(tried.log_determinant + (left + determinant) / 2)
+
+    ends = [(math.log(_LEAST), math.log(_MOST))] * 6 + [(math.log(step), math.log(max(longest, 2 * step)))]
+    searches = [
+        minimize(
+            cost,
+            np.append(np.repeat(np.log(start), 2), math.log(min(10 * step, longest))),
+            method="L-BFGS-B",
+            bounds=ends,
+            options={"maxiter": 40, "ftol": 1e-9, "eps": 1e-3},
+        )
+        for start in _STARTS
+    ]
+    return noise(min(searches, key=lambda search: search.fun).x)

@@ -1,0 +1,133 @@
+"""A robot and its swims as a model for the calibration: what was seen of a path tells what the model lacks.
+
+The numbers and effects of the robot are those of `calibration.swimmer`, the poses those of `calibration.swim.sight`.
+The base of the courses is a robot as first fitted. The noise is that of `calibration.swim.free_vehicle`, which knows
+no robot.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from calibration.statistics.budget import count_predictions
+from calibration.statistics.fit import fit
+from calibration.statistics.forward import secants
+from calibration.statistics.statistical_model import ForwardModel, Parameter, Parameters, Predict, start_values
+from calibration.swim.course import Base, Near
+from calibration.swim.free_vehicle import with_noise
+from calibration.swim.measured_swim import MeasuredSwim
+from calibration.swim.sight import Sight
+from calibration.swim.swim_runs import SwimRuns, runs_of_swims
+from calibration.swimmer.influences import HEADING, TRACKED_POINT
+from calibration.swimmer.measured_table import Measurements
+from calibration.swimmer.swimmer import SwimmerModel
+from common.arrays import Flags, Floats
+from planner.vehicle.vehicle import Vehicle
+from sim.model.robot import Robot
+
+_ASKEW = math.radians(3.0)  # σ of the angle of a marker
+
+
+@dataclass(frozen=True)
+class SwimModel:
+    """Predicts the poses of swims for a robot with given parameters."""
+
+    robot: SwimmerModel  # at constant motor, in both directions
+    sight: Sight
+    runs: SwimRuns  # those of the sight
+    near: Near = Near({})  # the base
+    began: Mapping[str, float] = field(default_factory=dict)  # its parameters
+
+    @property
+    def coefficients(self) -> tuple[Parameter, ...]:
+        return (*self.robot.coefficients, *self.sight.coefficients)
+
+    @property
+    def nuisances(self) -> tuple[Parameter, ...]:
+        return (*self.robot.nuisances, *self.sight.nuisances)
+
+    @property
+    def effects(self) -> tuple[Parameter, ...]:
+        return tuple(effect for effect in self.robot.effects if effect.name != TRACKED_POINT)
+
+    @property
+    def untestable(self) -> Mapping[str, str]:
+        fitted = {p.title for p in self.sight.coefficients}
+        return {title: why for title, why in self.robot.untestable.items() if title not in fitted}
+
+    def check(self, prediction: Floats) -> None:
+        """Accept poses in any units that they name: a start is fitted."""
+
+    def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
+        """Return the parameters of a first fit."""
+        return {**start, **self.began}
+
+    def possible(self) -> tuple[ForwardModel, list[dict[str, Any]]]:
+        """Return no runs: a swim is planned."""
+        raise NotImplementedError
+
+    def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
+        """Predict (P, n, 3), see `ForwardModel`."""
+        return self.sight.predict([(one, *of) for one, of in zip(sets, self.vehicles(sets), strict=True)])
+
+    def linearised(
+        self, at: Parameters, along: Sequence[Parameter], *, title: str = "", quick: bool = False
+    ) -> Predict:
+        """Return the linear model, by differences."""
+        return secants(self, at, along, title=title)
+
+    def vehicles(self, sets: Sequence[Parameters]) -> list[tuple[Vehicle, float, float]]:
+        """Make the vehicles of P parameter sets, with their units of time [s] and length [m]."""
+        inputs, columns, same, _ = self.robot.simulated([self.sight.without(one) for one in sets])
+        count_predictions(len(columns["N"]))
+        length, time = (np.broadcast_to(x, same.shape)[:, 0] for x in (inputs.view.length, inputs.view.time))
+        vehicles = self.near.vehicles(columns, same)
+        return list(zip(vehicles, time.tolist(), length.tolist(), strict=True))
+
+    def based(self, at: Parameters) -> SwimModel:
+        """Simulate the robot at some parameters along all swims, as the base of all others."""
+        columns = self.robot.simulated([self.sight.without(at)]).columns
+        robot = self.robot.robots(self.sight.without(at))[0]
+        model = replace(self, near=Near({name: abs(float(column[0])) if name == "omega_bar" else float(column[0]) for name, column in columns.items()}))
+        ((vehicle, _, _),) = model.vehicles([at])
+        bases = tuple(Base.of(swim, robot, vehicle) for swim in self.runs.swims)
+        return replace(model, sight=replace(self.sight, bases=bases), began=dict(at))
+
+
+def swim_model(
+    robot: Robot, swims: Sequence[MeasuredSwim], *, jobs: int | None = None, progress: bool = False
+) -> tuple[SwimModel, Flags]:
+    """Make the model of a robot's swims, with the noise of the poses, and with its base at a first fit.
+
+    Returns:
+        The model, and the poses (n,) that are held out.
+    """
+    runs, held_out = runs_of_swims(swims, robot.tail_length)
+    used = ~runs.left_out(held_out)
+    model = SwimModel(SwimmerModel(robot, _both_directions(robot), jobs), Sight(runs), runs)
+    start = start_values(model)
+    model = model.based(start)
+    ((vehicle, time, length),) = model.vehicles([start])
+    runs, start_of_parts = with_noise(model.sight, vehicle, time, length, used)
+    model = replace(model, sight=replace(model.sight, runs=runs), runs=runs)
+    names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
+    first = fit(model, {**start, **start_of_parts}, names, used, title="first fit" if progress else "")
+    return model.based(first.parameters), held_out
+
+
+def _both_directions(robot: Robot) -> Measurements:
+    """Make two runs of a robot, one in each direction of its motor."""
+    zeros = np.zeros(2)
+    return Measurements(
+        outputs=("v", "theta"), y=np.zeros((2, 2)), condition=np.arange(2), session=np.zeros(2, dtype=int),
+        session_names=("swim",), inputs=np.empty((2, 0)), input_names=(), rows=np.arange(1, 3), excluded=(),
+        caveats=(), tails=zeros + robot.tails, length=zeros + robot.tail_length,
+        omega=robot.motor_speed * np.array([1.0, -1.0]), noted=np.empty((2, 0)), sigmas={HEADING: _ASKEW},
+        noted_names=(),
+    )  # fmt: skip
