@@ -74,10 +74,11 @@ def swum(truth: Robot, plan: Plan, resolution: Resolution | None = None) -> Swum
 
 def make_track(
     truth: Robot, plan: Plan, *, seed: int, camera: CameraNoise | None = None,
-    resolution: Resolution | None = None, kick: tuple[float, float] = (0.0, 0.0), current: tuple[float, float] = (0.0, 0.0),
-    later_current: tuple[float, float] | None = None, marker: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    scale: float = 1.0, clock: float = 0.0, rest: tuple[float, float] = (0.0, 0.0),
-    lost: Spans = (), frozen: Spans = (), turned: Spans = (), outliers: float = 0.0,
+    resolution: Resolution | None = None, kick: tuple[float, float] = (0.0, 0.0),
+    current: tuple[float, float] = (0.0, 0.0), later_current: tuple[float, float] | None = None,
+    marker: tuple[float, float, float] = (0.0, 0.0, 0.0), scale: float = 1.0, clock: float = 0.0,
+    rest: tuple[float, float] = (0.0, 0.0), lost: Spans = (), frozen: Spans = (), turned: Spans = (),
+    outliers: float = 0.0,
 ) -> pd.DataFrame:  # fmt: skip
     """Make the track of a robot that swims a plan open loop, as a camera sees it.
 
