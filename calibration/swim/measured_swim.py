@@ -1,8 +1,8 @@
 """Swims as they were measured: the poses that a camera saw, and when the motor was reversed.
 
-A track has time_s, x_cm, y_cm and heading_deg, or these in other units, and `direction`, that of the motor: 1, −1,
-or 0 where it rests. A flip lies between the last row of one direction and the first of the other; where the
-simulator has written `dwell`, it is the last row of one. Without `direction`, a plan says when the motor flips.
+A track has time_s, x_cm, y_cm and heading_deg, or these in other units, and `direction`, that of the motor: 1,
+−1, or 0 where it rests. Without `direction`, a plan says when the motor flips (`calibration.swim.flips`). A row
+without a pose still says how the motor turns.
 """
 
 from __future__ import annotations
@@ -11,21 +11,30 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 import pandas as pd
 
-from camera.pose_tracks import read_tracks
+from calibration.swim.flips import Motor, motor_by_plan, motor_by_rows, planned_motor
+from calibration.swim.seen import continuous, outliers, told
+from camera.gaps import seen_poses
+from camera.pose_tracks import read_tracks, run_names
 from camera.track_options import TrackOptions
 from common.arrays import Floats
 from common.errors import InputError, naming
-from common.quantities import convert_columns, numbers_of
+from common.quantities import numbers_of
+from common.tables import row_name
+from common.units import split
 from planner.files.saved_plan import load_plan
 from planner.planning.plan import Plan
+from tracking.tracks import LAB, check_plan_id, in_lab, require_lab
 
-_POSE = ("x_cm", "y_cm", "heading_deg")
 _FEWEST_DWELLS, _FEWEST_POSES = 12, 60
+_LARGEST = 1e9  # of a value
+_SIMULATED = {"dwell", "time_bar"}  # columns of a track of the simulator
+_SAME = 1e-6  # of the whole time, by which rounded times differ
+_OFF = 0.1  # share of the flips; more are those of a tracker
 
 
 @dataclass(frozen=True)
@@ -37,23 +46,14 @@ class MeasuredSwim:
     poses: Floats  # (n, 3): x, y [m], heading [rad] without jumps, of the tracked point
     first_direction: int  # of the motor, +1 or −1
     flips: Floats  # (M + 1,) [s]: start of the motor, M − 1 flips, end of the last dwell
-    flip_error: float  # standard deviation of the time of a flip [s]
-    clock_known: bool  # flips and poses are on one clock; False: the flips are those of a plan
+    flip_error: float  # standard deviation of the time of a flip [s]; 0 where the simulator or a plan tells it
+    clock_known: bool  # flips and poses are on one clock; False: the start of a plan was searched for in the track
     said: tuple[str, ...]  # what the user should know of the track, in lines
 
     @property
     def dwells(self) -> Floats:
         """Times between the flips (M,) [s]."""
         return np.diff(self.flips)
-
-
-class _Motor(NamedTuple):
-    """When a motor was reversed."""
-
-    first_direction: int
-    flips: Floats  # (M + 1,) [s]
-    error: float  # standard deviation of a flip [s]
-    clock_known: bool
 
 
 def read_swims(
@@ -75,42 +75,104 @@ def read_swims(
     content = load_plan(plan) if isinstance(plan, str | Path) else plan
     content = content.to_dict() if isinstance(content, Plan) else content
     with naming(source):
-        table = source if isinstance(source, pd.DataFrame) else read_tracks(source, **options)
-        lab = {"time_s", *_POSE} & set(table)
-        table = table.drop(columns=["heading_rad"]) if "heading_deg" in lab and "heading_rad" in table else table
-        table = convert_columns(table, ("time_s", *_POSE), "the track").table
-        runs = table["run"].astype(str) if "run" in table else pd.Series("swim", table.index)
-        return [_swim(str(name), rows, content) for name, rows in table.groupby(runs, sort=False)]
-
-
-def _swim(name: str, rows: pd.DataFrame, plan: Mapping[str, Any] | None) -> MeasuredSwim:
-    values = np.stack([numbers_of(rows[each]).to_numpy() for each in ("time_s", *_POSE)], 1)
-    time, poses = values[:, 0], values[:, 1:] * [0.01, 0.01, math.pi / 180]
-    poses[:, 2] = np.unwrap(poses[:, 2])
-    if "direction" in rows:
-        motor = _of_directions(time, numbers_of(rows["direction"]).to_numpy(), rows.get("dwell"))
-    elif plan is not None:
-        flips = time[0] + np.append(0.0, np.cumsum(plan["dwell_s"]))
-        motor = _Motor(int(plan["first_direction"]), flips, 0.0, False)
-    else:
-        raise InputError("the track has no column 'direction' of the motor; give the plan that it followed")
-    seen = (time >= motor.flips[0]) & (time <= motor.flips[-1])
-    return MeasuredSwim(name, time[seen], poses[seen], *motor, said=())
-
-
-def _of_directions(time: Floats, direction: Floats, dwell: pd.Series | None) -> _Motor:
-    turning = np.flatnonzero(direction)
-    first, last = turning[0], turning[-1]
-    before = first + np.flatnonzero(np.diff(direction[first : last + 1]))
-    ends = [time[max(first - 1, 0) : first + 1].mean(), time[last : last + 2].mean()]
-    if dwell is not None:
-        return _Motor(int(direction[first]), np.array([time[first], *time[before], time[last]]), 0.0, True)
-    steps = time[before + 1] - time[before]
-    flips = np.array([ends[0], *(time[before] + steps / 2), ends[1]])
-    return _Motor(int(direction[first]), flips, float(np.median(steps)) / math.sqrt(12), True)
+        read = source if isinstance(source, pd.DataFrame) else read_tracks(source, **options)
+        table, lost = in_lab(read), tuple(read.attrs.get("lost", ()))
+        require_lab(table)
+        if content is not None:
+            check_plan_id(content, table)
+        exact = set(read) >= _SIMULATED
+        values = _values(table, [*LAB, *(name for name in ("direction",) if name in table)])
+        name = "swim" if isinstance(source, pd.DataFrame) else Path(source).stem
+        runs = run_names(table["run"]) if "run" in table else pd.Series(name, table.index)
+        swims: list[MeasuredSwim] = []
+        for run in (names := runs.unique()):
+            rows = np.flatnonzero(runs == run)
+            for back in rows[1:][np.diff(values[rows, 0]) < 0]:
+                at = row_name(table, int(back))
+                raise InputError(f"the time of {run} goes back at {at}; give a row for each time, in order")
+            with naming(run if len(names) > 1 else None):
+                swims.append(_swim(run, values[rows], content, exact=exact, lost=lost))
+            lost = ()
+    return swims
 
 
 def is_track(source: str | Path | pd.DataFrame) -> bool:
-    """Tell whether a table has poses, not runs of steady motion."""
+    """Tell whether a table has poses, and is none of runs of steady motion.
+
+    Raises:
+        InputError: the file cannot be read, or another program has written it, which `read_swims` must be told.
+    """
     table = source if isinstance(source, pd.DataFrame) else read_tracks(source)
-    return "omega_rpm" not in table and any(str(name).startswith("heading") for name in table)
+    quantities = {split(str(name)).quantity.lower() for name in table}
+    return {"x", "y", "heading"} <= quantities and "omega_rpm" not in table
+
+
+def _values(table: pd.DataFrame, names: list[str]) -> Floats:
+    """Return columns of a track as numbers (m, k); a pose may have gaps, NaN.
+
+    Raises:
+        InputError: a value is no number of a possible size.
+    """
+    columns = []
+    for name in names:
+        numbers, missing = numbers_of(table[name]).to_numpy(), table[name].isna().to_numpy()
+        good = np.abs(numbers) < _LARGEST
+        if name == "direction":
+            good &= np.isin(numbers, (-1, 0, 1))
+        bad = np.flatnonzero(~good & ~(missing & (name in LAB[1:])))
+        if len(bad):
+            wanted = "1, -1 or 0" if name == "direction" else "a finite number"
+            raise InputError(f"{row_name(table, bad[0])}: {name} is {table[name].iloc[bad[0]]}; give {wanted}")
+        columns.append(numbers)
+    return np.stack(columns, 1)
+
+
+def _swim(
+    name: str, values: Floats, plan: Mapping[str, Any] | None, *, exact: bool, lost: tuple[str, ...]
+) -> MeasuredSwim:
+    """Make a swim of the rows of a run (m, 4 or 5): LAB, and direction if there is one."""
+    seen = values[np.isfinite(values).all(1)]
+    seen = seen[np.diff(seen[:, 0], prepend=-math.inf) > 0]
+    missing = int(np.isnan(values).any(1).sum())
+    said = [*lost, *([f"{missing} of {len(values)} rows have no pose"] if missing else [])]
+    time, poses = seen[:, 0], seen[:, 1:4] * [0.01, 0.01, math.pi / 180]
+    _refuse_few(len(time), _FEWEST_POSES, "poses")
+    if values.shape[1] > len(LAB):
+        motor, rests = motor_by_rows(values[:, 0], values[:, 4], exact=exact)
+        said += [*rests, *([] if plan is None else _led(motor, plan))]
+    elif plan is not None:
+        motor, doubts = motor_by_plan(plan, time, poses[:, 2])
+        said += doubts
+    else:
+        raise InputError("the track has no column 'direction' of the motor; give the plan that was carried out")
+    turning = (time >= motor.flips[0]) & (time <= motor.flips[-1])
+    time, poses = time[turning], poses[turning]
+    _refuse_few(len(time), _FEWEST_POSES, "poses while the motor turns")
+    new, gaps = (np.ones(len(time), bool), []) if exact else seen_poses(time, poses, share=0.0)
+    time, poses = time[new], poses[new]
+    wrong = outliers(time, poses, motor)
+    said += [*gaps, *told(time, wrong, "jump away from the others")]
+    time, poses = time[~wrong], poses[~wrong]
+    heading, used, turned = continuous(time, poses[:, 2], motor)
+    time, poses = time[used], np.column_stack([poses[:, :2], heading])[used]
+    motor = motor.within(time[0], time[-1])
+    _refuse_few(len(time), _FEWEST_POSES, "usable poses")
+    _refuse_few(len(motor.flips) - 1, _FEWEST_DWELLS, "dwells between flips of the motor")
+    return MeasuredSwim(name, time, poses, *motor, said=(*said, *turned))
+
+
+def _refuse_few(count: int, fewest: int, what: str) -> None:
+    """Refuse a swim that is too short to tell anything."""
+    if count < fewest:
+        raise InputError(f"a swim needs {fewest} {what}; there are {count}")
+
+
+def _led(motor: Motor, plan: Mapping[str, Any]) -> list[str]:
+    """Say whether the motor was reversed at other times than a plan says, by more than a row of the track."""
+    planned = planned_motor(plan).flips
+    flips = motor.flips[1:-1] - motor.flips[0]
+    nearest = planned[np.abs(np.subtract.outer(flips, planned)).argmin(1)]
+    off = np.abs(flips - nearest) > math.sqrt(12) * motor.error + _SAME * planned[-1]
+    if off.mean() <= _OFF:
+        return []
+    return [f"{off.sum()} of {len(off)} flips are not where the plan has them: a tracker led the robot"]

@@ -1,0 +1,133 @@
+"""When the motor of a swim was reversed: as a column of a track tells, or as planned.
+
+A flip lies between the last row of one direction and the first row of the next: half-way, with the standard
+deviation of a uniform distribution. In a track of the simulator, the last row of a dwell is its end.
+
+The clock of a plan begins with its motor, that of a camera at any time. The robot turns to the left while the
+direction is positive, so the start of the plan is where the turns of the heading fit the directions best: where
+
+    sum over t of (ψ(t + T) − ψ(t)) (D(t + T − start) − D(t − start)),   D(t) = ∫ direction dt,   T = half a dwell,
+
+is largest. This leaves the lag with which a robot follows its motor, a part of a dwell.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from common.arrays import Floats
+from common.errors import InputError
+from common.reading import expecting
+from common.units import format_time
+from sim.model.schedule import PLAN_FILE
+
+_FINE, _MOST = 8, 2**20  # steps in half a dwell, in which a start is searched for; instants
+_LIKE, _WELL = (
+    0.4,
+    0.75,
+)  # correlations of turns with directions: 0.35 with other plans, 0.85 and more with the own one
+_CLIP = 3.0  # median turns; more are jumps of the camera
+
+
+class Motor(NamedTuple):
+    """When a motor was reversed; M dwells."""
+
+    first_direction: int
+    flips: Floats  # (M + 1,) [s]: start, M − 1 flips, end of the last dwell
+    error: float = 0.0  # standard deviation of the time of a flip [s]
+    clock_known: bool = True  # the flips are on the clock of the track
+
+    @property
+    def directions(self) -> Floats:
+        """Of the dwells (M,)."""
+        return np.where(np.arange(len(self.flips) - 1) % 2, -1.0, 1.0) * self.first_direction
+
+    def turned(self, time: Floats) -> Floats:
+        """Integrate the direction from the start to times (n,) [s]."""
+        steps = self.directions * np.diff(self.flips)
+        return np.asarray(np.interp(time, self.flips, np.append(0.0, np.cumsum(steps))))
+
+    def within(self, first: float, last: float) -> Motor:
+        """Return the dwells from the one before that of a time on, to that of another one."""
+        begin = max(int(np.searchsorted(self.flips, first, side="right")) - 2, 0)
+        end = int(np.searchsorted(self.flips, last))
+        sense = int(self.directions[begin])
+        return self._replace(first_direction=sense, flips=self.flips[begin : end + 1])
+
+
+def motor_by_rows(time: Floats, direction: Floats, *, exact: bool) -> tuple[Motor, list[str]]:
+    """Find the flips in the rows of a track, and say where the motor rests meanwhile.
+
+    Args:
+        time: (m,), not decreasing [s].
+        direction: of the motor (m,): 1, −1, or 0 where it rests.
+        exact: the last row of a dwell is its end.
+
+    Raises:
+        InputError: the motor never turns, or two flips have one time.
+    """
+    edges = np.flatnonzero(np.diff(direction != 0, prepend=False, append=False))
+    parts = edges.reshape(-1, 2)  # first row in which it turns, first in which it rests again
+    if not len(parts):
+        raise InputError("the motor rests all the time: direction is 0; give 1 and -1 where it turns")
+    first, end = parts[np.argmax(time[parts[:, 1] - 1] - time[parts[:, 0]])]
+    last = first + np.flatnonzero(np.diff(direction[first:end]))  # rows of a dwell, but of the last dwell
+    before, after = time[last], time[last + 1]
+    begin = time[first] if exact or first == 0 else time[first - 1 : first + 1].mean()
+    over = time[end - 1] if exact else time[end - 1 : end + 1].mean()
+    flips = np.array([begin, *(before if exact else (before + after) / 2), over])
+    if (np.diff(flips) <= 0).any():
+        again = flips[1:][np.diff(flips) <= 0][0]
+        raise InputError(f"direction changes twice at {again:g} s; give the time of each change")
+    error = 0.0 if exact or not len(before) else float(np.median(after - before)) / math.sqrt(12)
+    rests = [f"{format_time(begin)} to {format_time(over)}"] * (len(parts) > 1)
+    said = [
+        f"the motor rests {len(parts) - 1} times in between; kept is the longest part, {part}" for part in rests
+    ]
+    return Motor(int(direction[first]), flips, error), said
+
+
+def planned_motor(plan: Mapping[str, Any], span: float = 0.0) -> Motor:
+    """Return the motor of a plan, started at 0; a schedule that repeats is carried out for so long [s].
+
+    Raises:
+        InputError: the content is that of no plan.
+    """
+    with expecting(PLAN_FILE, "the plan", "plan again"):
+        dwells, first = np.array(plan["dwell_s"], dtype=float), int(plan["first_direction"])
+        laps = max(math.ceil(span / dwells.sum()), 1) if "lap" in plan else 1
+    return Motor(first, np.append(0.0, np.cumsum(np.tile(dwells, laps))), clock_known=False)
+
+
+def motor_by_plan(plan: Mapping[str, Any], time: Floats, heading: Floats) -> tuple[Motor, list[str]]:
+    """Find the start of a plan in a track: where the headings turn as its motor does; say if they do so in part.
+
+    Args:
+        plan: content of plan.json.
+        time: of the headings (n,) [s].
+        heading: (n,) [rad].
+
+    Raises:
+        InputError: the headings do not turn with the flips of the plan.
+    """
+    planned = planned_motor(plan, float(np.ptp(time)))
+    end = planned.flips[-1]
+    step = max(float(np.median(np.diff(planned.flips))) / (2 * _FINE), (np.ptp(time) + end) / _MOST)
+    seen = np.interp(np.arange(time[0], time[-1], step), time, np.unwrap(heading))
+    turns, wanted = (each[_FINE:] - each[:-_FINE] for each in (seen, planned.turned(np.arange(0.0, end, step))))
+    usual = _CLIP * np.median(np.abs(turns))
+    turns = np.clip(turns, -usual, usual)
+    size = len(turns) + len(wanted) - 1
+    alike = np.fft.irfft(np.fft.rfft(turns, size) * np.fft.rfft(wanted[::-1], size), size)
+    late = int(np.argmax(alike)) - len(wanted) + 1  # steps
+    turns, wanted = turns[max(late, 0) : late + len(wanted)], wanted[max(-late, 0) : len(turns) - late]
+    fit = float(turns @ wanted) / math.sqrt(float(turns @ turns) * float(wanted @ wanted) or math.inf)
+    what = f"the headings turn with the flips of the plan to {100 * fit:.0f} %"
+    if fit < _LIKE:
+        raise InputError(f"{what} alone: is it the plan that was carried out? Give it, or a column 'direction'")
+    said = [f"{what} alone: if a tracker led the robot, its flips are needed, as a column 'direction'"]
+    return planned._replace(flips=time[0] + step * late + planned.flips), said if fit < _WELL else []
