@@ -26,11 +26,15 @@ from common.units import format_time
 from sim.model.schedule import PLAN_FILE
 
 _FINE, _MOST = 8, 2**20  # steps in half a dwell, in which a start is searched for; instants
+_SAME, _OTHERS = (
+    1e-6,
+    0.1,
+)  # of the whole time, by which rounded times differ; share of flips, more are a tracker's
 _LIKE, _WELL = (
     0.4,
     0.75,
 )  # correlations of turns with directions: 0.35 with other plans, 0.85 and more with the own one
-_CLIP = 3.0  # median turns; more are jumps of the camera
+_JUMP = 4.0  # median turns; more are jumps of the camera
 
 
 class Motor(NamedTuple):
@@ -40,6 +44,7 @@ class Motor(NamedTuple):
     flips: Floats  # (M + 1,) [s]: start, M − 1 flips, end of the last dwell
     error: float = 0.0  # standard deviation of the time of a flip [s]
     clock_known: bool = True  # the flips are on the clock of the track
+    unseen: Floats = np.empty((0, 2))  # begin and end of times without rows in which it may have flipped twice [s]
 
     @property
     def directions(self) -> Floats:
@@ -84,11 +89,13 @@ def motor_by_rows(time: Floats, direction: Floats, *, exact: bool) -> tuple[Moto
         again = flips[1:][np.diff(flips) <= 0][0]
         raise InputError(f"direction changes twice at {again:g} s; give the time of each change")
     error = 0.0 if exact or not len(before) else float(np.median(after - before)) / math.sqrt(12)
+    rows = time[first:first] if exact else time[first:end]
+    gaps = np.flatnonzero(np.diff(rows) > np.diff(flips).min())
     rests = [f"{format_time(begin)} to {format_time(over)}"] * (len(parts) > 1)
     said = [
         f"the motor rests {len(parts) - 1} times in between; kept is the longest part, {part}" for part in rests
     ]
-    return Motor(int(direction[first]), flips, error), said
+    return Motor(int(direction[first]), flips, error, unseen=np.stack([rows[gaps], rows[gaps + 1]], 1)), said
 
 
 def planned_motor(plan: Mapping[str, Any], span: float = 0.0) -> Motor:
@@ -101,6 +108,25 @@ def planned_motor(plan: Mapping[str, Any], span: float = 0.0) -> Motor:
         dwells, first = np.array(plan["dwell_s"], dtype=float), int(plan["first_direction"])
         laps = max(math.ceil(span / dwells.sum()), 1) if "lap" in plan else 1
     return Motor(first, np.append(0.0, np.cumsum(np.tile(dwells, laps))), clock_known=False)
+
+
+def as_planned(motor: Motor, plan: Mapping[str, Any]) -> tuple[Motor, list[str]]:
+    """Take the flips of a plan instead of those between rows that agree with them; say if they do not.
+
+    Raises:
+        InputError: the content is that of no plan.
+    """
+    (start, *flips, end), row = motor.flips, math.sqrt(12) * motor.error
+    planned = planned_motor(plan, end - start)
+    after = np.array(flips) - start
+    off = after - planned.flips[np.abs(np.subtract.outer(after, planned.flips)).argmin(1)]
+    other = int((np.abs(off) > row + _SAME * planned.flips[-1]).sum())
+    if other > _OTHERS * len(off) or planned.first_direction != motor.first_direction:
+        return motor, [f"{other} of {len(off)} flips are not where the plan has them: a tracker led the robot"]
+    begun = planned.flips + start + np.median(off)
+    begun = begun[begun <= end + row]
+    whole = begun if begun[-1] >= end - row else np.append(begun, end)  # it was stopped earlier
+    return Motor(motor.first_direction, whole, motor.error / math.sqrt(len(off))), []
 
 
 def motor_by_plan(plan: Mapping[str, Any], time: Floats, heading: Floats) -> tuple[Motor, list[str]]:
@@ -119,8 +145,7 @@ def motor_by_plan(plan: Mapping[str, Any], time: Floats, heading: Floats) -> tup
     step = max(float(np.median(np.diff(planned.flips))) / (2 * _FINE), (np.ptp(time) + end) / _MOST)
     seen = np.interp(np.arange(time[0], time[-1], step), time, np.unwrap(heading))
     turns, wanted = (each[_FINE:] - each[:-_FINE] for each in (seen, planned.turned(np.arange(0.0, end, step))))
-    usual = _CLIP * np.median(np.abs(turns))
-    turns = np.clip(turns, -usual, usual)
+    turns[np.abs(turns) > _JUMP * np.median(np.abs(turns))] = 0.0
     size = len(turns) + len(wanted) - 1
     alike = np.fft.irfft(np.fft.rfft(turns, size) * np.fft.rfft(wanted[::-1], size), size)
     late = int(np.argmax(alike)) - len(wanted) + 1  # steps

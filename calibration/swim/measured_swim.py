@@ -16,7 +16,7 @@ from typing import Any, Unpack
 import numpy as np
 import pandas as pd
 
-from calibration.swim.flips import Motor, motor_by_plan, motor_by_rows, planned_motor
+from calibration.swim.flips import as_planned, motor_by_plan, motor_by_rows
 from calibration.swim.seen import continuous, outliers, told
 from camera.gaps import seen_poses
 from camera.pose_tracks import read_tracks, run_names
@@ -33,8 +33,6 @@ from tracking.tracks import LAB, check_plan_id, in_lab, require_lab
 _FEWEST_DWELLS, _FEWEST_POSES = 12, 60
 _LARGEST = 1e9  # of a value
 _SIMULATED = {"dwell", "time_bar"}  # columns of a track of the simulator
-_SAME = 1e-6  # of the whole time, by which rounded times differ
-_OFF = 0.1  # share of the flips; more are those of a tracker
 
 
 @dataclass(frozen=True)
@@ -139,7 +137,8 @@ def _swim(
     _refuse_few(len(time), _FEWEST_POSES, "poses")
     if values.shape[1] > len(LAB):
         motor, rests = motor_by_rows(values[:, 0], values[:, 4], exact=exact)
-        said += [*rests, *([] if plan is None else _led(motor, plan))]
+        motor, led = (motor, []) if plan is None or exact else as_planned(motor, plan)
+        said += [*rests, *led]
     elif plan is not None:
         motor, doubts = motor_by_plan(plan, time, poses[:, 2])
         said += doubts
@@ -155,24 +154,13 @@ def _swim(
     time, poses = time[~wrong], poses[~wrong]
     heading, used, turned = continuous(time, poses[:, 2], motor)
     time, poses = time[used], np.column_stack([poses[:, :2], heading])[used]
-    motor = motor.within(time[0], time[-1])
+    first, flips, error, clock_known, _ = motor.within(time[0], time[-1])
     _refuse_few(len(time), _FEWEST_POSES, "usable poses")
-    _refuse_few(len(motor.flips) - 1, _FEWEST_DWELLS, "dwells between flips of the motor")
-    return MeasuredSwim(name, time, poses, *motor, said=(*said, *turned))
+    _refuse_few(len(flips) - 1, _FEWEST_DWELLS, "dwells between flips of the motor")
+    return MeasuredSwim(name, time, poses, first, flips, error, clock_known, (*said, *turned))
 
 
 def _refuse_few(count: int, fewest: int, what: str) -> None:
     """Refuse a swim that is too short to tell anything."""
     if count < fewest:
         raise InputError(f"a swim needs {fewest} {what}; there are {count}")
-
-
-def _led(motor: Motor, plan: Mapping[str, Any]) -> list[str]:
-    """Say whether the motor was reversed at other times than a plan says, by more than a row of the track."""
-    planned = planned_motor(plan).flips
-    flips = motor.flips[1:-1] - motor.flips[0]
-    nearest = planned[np.abs(np.subtract.outer(flips, planned)).argmin(1)]
-    off = np.abs(flips - nearest) > math.sqrt(12) * motor.error + _SAME * planned[-1]
-    if off.mean() <= _OFF:
-        return []
-    return [f"{off.sum()} of {len(off)} flips are not where the plan has them: a tracker led the robot"]

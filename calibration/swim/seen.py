@@ -1,6 +1,6 @@
 """Poses of a swim that can be used: without outliers and turned headings, and with whole turns counted.
 
-Outliers lie apart from lines that bend at the flips: the place x + i y and the heading exp(i ψ) are linear in time
+Outliers lie apart from lines that bend at the flips: the place x + i y and the axis exp(2 i ψ) are linear in time
 between knots, which are the flips, and more within a long dwell. The values at the knots are fitted by the least
 sum of distances, which a few wrong poses do not move (weights 1/distance, again and again).
 
@@ -22,19 +22,29 @@ from common.errors import InputError
 from common.units import format_time
 
 _FAR = 15.0  # median distances from the lines; noise keeps within 7, and within 10 where a dwell has four poses
+_MOST = 0.1  # share of outliers
 _ROUNDS = 10
 _QUARTER = math.pi / 2
 
 
 def outliers(time: Floats, poses: Floats, motor: Motor) -> Flags:
-    """Tell which poses (n, 3) jump away and back; n times [s]."""
+    """Tell which poses (n, 3) jump away and back; n times [s].
+
+    Raises:
+        InputError: they are many.
+    """
     dwells = np.diff(motor.flips)
     pieces = np.maximum(np.rint(dwells / np.median(dwells)), 1).astype(int)
     knots = np.interp(np.arange(pieces.sum() + 1), np.append(0, np.cumsum(pieces)), motor.flips)
     far = np.zeros(len(time), bool)
-    for values in (poses[:, 0] + 1j * poses[:, 1], np.exp(1j * poses[:, 2])):
+    for values in (poses[:, 0] + 1j * poses[:, 1], np.exp(2j * poses[:, 2])):
         distance = _distances(time, values, knots)
         far |= distance > _FAR * np.median(distance)
+    if far.mean() > _MOST:
+        raise InputError(
+            f"{far.sum()} of {len(far)} poses jump away from the others (the first at {time[far][0]:g} s), or the "
+            "motor flips at other times; check how the robot was tracked"
+        )
     return far
 
 
@@ -88,16 +98,18 @@ def continuous(time: Floats, heading: Floats, motor: Motor) -> tuple[Floats, Fla
     long = steps > max(shortest, 2 * usual)
     exchanged = ~long & (np.abs(jump) > _QUARTER)
     jump -= math.pi * np.sign(jump) * exchanged
-    unseen = min(_QUARTER, rate * shortest) if motor.clock_known else _QUARTER  # two flips change it by twice that
-    cuts = np.flatnonzero(long & (np.abs(jump) > unseen)) + 1
+    begin, end = motor.unseen.T
+    blind = np.searchsorted(begin, time[1:]) > np.searchsorted(end, time[:-1], side="right")
+    most = np.where(blind, min(_QUARTER, rate * shortest), _QUARTER)  # two flips would change it by twice that
+    cuts = np.flatnonzero(long & (np.abs(jump) > most)) + 1
     ends = np.array([0, *cuts, len(time)])
     part = int(np.argmax(np.diff(ends)))
     inside = np.zeros(len(time), bool)
     inside[ends[part] : ends[part + 1]] = True
     side = np.append(0, np.cumsum(exchanged)) % 2
-    most = int(side[inside].mean() > 0.5)  # on this side of the robot its front is
-    turned = side != most
-    whole = heading[0] + math.pi * most + np.append(0.0, np.cumsum(rate * motion + jump))
+    front = int(side[inside].mean() > 0.5)
+    turned = side != front
+    whole = heading[0] + math.pi * front + np.append(0.0, np.cumsum(rate * motion + jump))
     said = told(time[inside], turned[inside], "are turned by half a turn")
     if len(cuts):
         first, last = time[inside][[0, -1]]
