@@ -26,14 +26,9 @@ from common.units import format_time
 from sim.model.schedule import PLAN_FILE
 
 _FINE, _MOST = 8, 2**20  # steps in half a dwell, in which a start is searched for; instants
-_SAME, _OTHERS = (
-    1e-6,
-    0.1,
-)  # of the whole time, by which rounded times differ; share of flips, more are a tracker's
-_LIKE, _WELL = (
-    0.4,
-    0.75,
-)  # correlations of turns with directions: 0.35 with other plans, 0.85 and more with the own one
+_SAME = 1e-6  # of the whole time, by which rounded times differ
+_OTHERS = 0.1  # share of the flips; if more are not where a plan has them, it was not carried out
+_LIKE, _WELL = 0.4, 0.7  # correlations of turns with directions: below 0.35 with other plans, 0.85 with the own
 _JUMP = 4.0  # median turns; more are jumps of the camera
 
 
@@ -44,12 +39,12 @@ class Motor(NamedTuple):
     flips: Floats  # (M + 1,) [s]: start, M − 1 flips, end of the last dwell
     error: float = 0.0  # standard deviation of the time of a flip [s]
     clock_known: bool = True  # the flips are on the clock of the track
-    unseen: Floats = np.empty((0, 2))  # begin and end of times without rows in which it may have flipped twice [s]
+    unseen: Floats = np.empty((0, 2))  # begin and end of times without rows in which it may flip twice [s]
 
     @property
     def directions(self) -> Floats:
         """Of the dwells (M,)."""
-        return np.where(np.arange(len(self.flips) - 1) % 2, -1.0, 1.0) * self.first_direction
+        return self.first_direction * np.where(np.arange(len(self.flips) - 1) % 2, -1.0, 1.0)
 
     def turned(self, time: Floats) -> Floats:
         """Integrate the direction from the start to times (n,) [s]."""
@@ -91,10 +86,10 @@ def motor_by_rows(time: Floats, direction: Floats, *, exact: bool) -> tuple[Moto
     error = 0.0 if exact or not len(before) else float(np.median(after - before)) / math.sqrt(12)
     rows = time[first:first] if exact else time[first:end]
     gaps = np.flatnonzero(np.diff(rows) > np.diff(flips).min())
-    rests = [f"{format_time(begin)} to {format_time(over)}"] * (len(parts) > 1)
-    said = [
-        f"the motor rests {len(parts) - 1} times in between; kept is the longest part, {part}" for part in rests
-    ]
+    said = []
+    if len(parts) > 1:
+        part = f"{format_time(begin)} to {format_time(over)}"
+        said.append(f"the motor rests {len(parts) - 1} times in between; kept is the longest part, {part}")
     return Motor(int(direction[first]), flips, error, unseen=np.stack([rows[gaps], rows[gaps + 1]], 1)), said
 
 
@@ -123,6 +118,8 @@ def as_planned(motor: Motor, plan: Mapping[str, Any]) -> tuple[Motor, list[str]]
     other = int((np.abs(off) > row + _SAME * planned.flips[-1]).sum())
     if other > _OTHERS * len(off) or planned.first_direction != motor.first_direction:
         return motor, [f"{other} of {len(off)} flips are not where the plan has them: a tracker led the robot"]
+    if not row:
+        return motor, []
     begun = planned.flips + start + np.median(off)
     begun = begun[begun <= end + row]
     whole = begun if begun[-1] >= end - row else np.append(begun, end)  # it was stopped earlier
@@ -151,8 +148,10 @@ def motor_by_plan(plan: Mapping[str, Any], time: Floats, heading: Floats) -> tup
     late = int(np.argmax(alike)) - len(wanted) + 1  # steps
     turns, wanted = turns[max(late, 0) : late + len(wanted)], wanted[max(-late, 0) : len(turns) - late]
     fit = float(turns @ wanted) / math.sqrt(float(turns @ turns) * float(wanted @ wanted) or math.inf)
-    what = f"the headings turn with the flips of the plan to {100 * fit:.0f} %"
+    doubt = (
+        f"the headings turn with the flips of the plan to {100 * fit:.0f} % alone: was it carried out, without a "
+        "tracker? A column 'direction' tells it"
+    )
     if fit < _LIKE:
-        raise InputError(f"{what} alone: is it the plan that was carried out? Give it, or a column 'direction'")
-    said = [f"{what} alone: if a tracker led the robot, its flips are needed, as a column 'direction'"]
-    return planned._replace(flips=time[0] + step * late + planned.flips), said if fit < _WELL else []
+        raise InputError(doubt)
+    return planned._replace(flips=time[0] + step * late + planned.flips), [doubt] if fit < _WELL else []

@@ -131,33 +131,36 @@ def _swim(
     """Make a swim of the rows of a run (m, 4 or 5): LAB, and direction if there is one."""
     seen = values[np.isfinite(values).all(1)]
     seen = seen[np.diff(seen[:, 0], prepend=-math.inf) > 0]
+    time, poses = seen[:, 0], seen[:, 1:4] * [0.01, 0.01, math.pi / 180]
     missing = int(np.isnan(values).any(1).sum())
     said = [*lost, *([f"{missing} of {len(values)} rows have no pose"] if missing else [])]
-    time, poses = seen[:, 0], seen[:, 1:4] * [0.01, 0.01, math.pi / 180]
     _refuse_few(len(time), _FEWEST_POSES, "poses")
     if values.shape[1] > len(LAB):
-        motor, rests = motor_by_rows(values[:, 0], values[:, 4], exact=exact)
-        motor, led = (motor, []) if plan is None or exact else as_planned(motor, plan)
-        said += [*rests, *led]
+        motor, notes = motor_by_rows(values[:, 0], values[:, 4], exact=exact)
+        said += notes
+        _refuse_few(len(motor.flips) - 1, _FEWEST_DWELLS, "dwells between flips of the motor")
+        motor, notes = as_planned(motor, plan) if plan is not None else (motor, [])
     elif plan is not None:
-        motor, doubts = motor_by_plan(plan, time, poses[:, 2])
-        said += doubts
+        motor, notes = motor_by_plan(plan, time, poses[:, 2])
     else:
         raise InputError("the track has no column 'direction' of the motor; give the plan that was carried out")
+    said += notes
     turning = (time >= motor.flips[0]) & (time <= motor.flips[-1])
     time, poses = time[turning], poses[turning]
     _refuse_few(len(time), _FEWEST_POSES, "poses while the motor turns")
-    new, gaps = (np.ones(len(time), bool), []) if exact else seen_poses(time, poses, share=0.0)
-    time, poses = time[new], poses[new]
+    if not exact:
+        new, notes = seen_poses(time, poses, share=0.0)
+        time, poses = time[new], poses[new]
+        said += notes
     wrong = outliers(time, poses, motor)
-    said += [*gaps, *told(time, wrong, "jump away from the others")]
+    said += told(time, wrong, "jump away from the others")
     time, poses = time[~wrong], poses[~wrong]
-    heading, used, turned = continuous(time, poses[:, 2], motor)
+    heading, used, notes = continuous(time, poses[:, 2], motor)
     time, poses = time[used], np.column_stack([poses[:, :2], heading])[used]
     first, flips, error, clock_known, _ = motor.within(time[0], time[-1])
     _refuse_few(len(time), _FEWEST_POSES, "usable poses")
-    _refuse_few(len(flips) - 1, _FEWEST_DWELLS, "dwells between flips of the motor")
-    return MeasuredSwim(name, time, poses, first, flips, error, clock_known, (*said, *turned))
+    _refuse_few(len(flips) - 1, _FEWEST_DWELLS, "dwells in which it is seen")
+    return MeasuredSwim(name, time, poses, first, flips, error, clock_known, (*said, *notes))
 
 
 def _refuse_few(count: int, fewest: int, what: str) -> None:

@@ -24,6 +24,7 @@ from common.units import format_time
 _FAR = 15.0  # median distances from the lines; noise keeps within 7, and within 10 where a dwell has four poses
 _MOST = 0.1  # share of outliers
 _ROUNDS = 10
+_JUMP = 4.0  # median turns
 _QUARTER = math.pi / 2
 
 
@@ -82,10 +83,8 @@ def continuous(time: Floats, heading: Floats, motor: Motor) -> tuple[Floats, Fla
     """
     steps, motion = np.diff(time), np.diff(motor.turned(time))
     shortest, usual = np.diff(motor.flips).min(), np.median(steps)
-    near = steps <= 2 * usual
-    turn = (
-        np.remainder(np.diff(heading) + _QUARTER, math.pi) - _QUARTER
-    )  # an exchange of front and rear is no turn
+    turn = np.remainder(np.diff(heading) + math.pi, math.tau) - math.pi
+    near = (steps <= 2 * usual) & (np.abs(turn) <= _JUMP * np.median(np.abs(turn)))
     rate = float(turn[near] @ motion[near]) / float(motion[near] @ motion[near] or math.inf)
     if abs(rate) * usual > _QUARTER:
         raise InputError("the robot turns by half a turn or more between two poses; take more pictures per second")
@@ -101,7 +100,8 @@ def continuous(time: Floats, heading: Floats, motor: Motor) -> tuple[Floats, Fla
     begin, end = motor.unseen.T
     blind = np.searchsorted(begin, time[1:]) > np.searchsorted(end, time[:-1], side="right")
     most = np.where(blind, min(_QUARTER, rate * shortest), _QUARTER)  # two flips would change it by twice that
-    cuts = np.flatnonzero(long & (np.abs(jump) > most)) + 1
+    most[blind & (np.diff(np.searchsorted(motor.flips, time)) > 0)] = 0.0  # a flip at an unknown time, or three
+    cuts = np.flatnonzero(long & (np.abs(jump) >= most)) + 1
     ends = np.array([0, *cuts, len(time)])
     part = int(np.argmax(np.diff(ends)))
     inside = np.zeros(len(time), bool)
