@@ -22,13 +22,16 @@ _SURE = 3.0  # standard errors of a rate
 _FREE = 4  # degrees of freedom that the scatter of headings needs
 
 
-def seen_poses(time: Floats, poses: Floats, least: float = 0.0) -> tuple[NDArray[np.bool_], list[str]]:
+def seen_poses(
+    time: Floats, poses: Floats, least: float = 0.0, *, share: float = _LEAST
+) -> tuple[NDArray[np.bool_], list[str]]:
     """Tell which poses are new, and say for how long there are none.
 
     Args:
         time: in s (m,), in order.
         poses: (m, 3).
         least: a shorter time is not told [s].
+        share: of the whole time; if all such times together are less, they are not told, and no pose is left out.
 
     Returns:
         False for a pose that a frozen camera repeats (m,); lines such as "no pose for 150 s (12 % of the time)".
@@ -41,7 +44,7 @@ def seen_poses(time: Floats, poses: Floats, least: float = 0.0) -> tuple[NDArray
     long = max(_LONG * typical, least)
     frozen = held > long
     totals = {"no pose": missing[missing > long].sum(), "the same pose": held[frozen].sum()}
-    told = {words: total for words, total in totals.items() if total > _LEAST * whole}
+    told = {words: total for words, total in totals.items() if total > share * whole}
     kept = new | ~np.repeat(frozen, ends - starts + 1) | ("the same pose" not in told)
     lines = [
         f"{words} for {total:.{0 if total >= 10 else 1}f} s ({100 * total / whole:.0f} % of the time)"

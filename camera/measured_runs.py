@@ -22,7 +22,7 @@ import pandas as pd
 
 from camera.circle import TrackedRun, TrackFit, fit_track
 from camera.gaps import seen_poses
-from camera.pose_tracks import read_tracks
+from camera.pose_tracks import read_tracks, run_names
 from camera.spin import fit_spin
 from camera.track_options import TrackOptions
 from common.arrays import Floats
@@ -108,7 +108,7 @@ def _check_runs(table: pd.DataFrame) -> None:
     """Refuse runs that have no names, or that are there twice."""
     if "run" not in table:
         raise InputError("the runs have no column 'run' that says which track is theirs")
-    names = _names(table["run"])
+    names = run_names(table["run"])
     unnamed = np.flatnonzero(names == "")
     if len(unnamed):
         raise InputError(f"{row_name(table, int(unnamed[0]))} of the runs has no name of a run")
@@ -124,7 +124,7 @@ def _measured(samples: pd.DataFrame, table: pd.DataFrame, y_down: bool, robot: R
     of_run = _tracks_by_run(samples)
     nothing = pd.DataFrame(columns=COLUMNS[1:], dtype=float)
     unnamed = of_run.pop("", nothing)
-    runs = list(_names(table["run"]))
+    runs = list(run_names(table["run"]))
     if not set(runs) & set(of_run):
         raise InputError(f"no run has a track: the runs are {_listed(runs)}; the tracks are {_listed(of_run)}")
     aside = [f"{len(unnamed)} samples have no name of a run"] if len(unnamed) else []
@@ -170,7 +170,7 @@ def _tracks_by_run(samples: pd.DataFrame) -> dict[str, pd.DataFrame]:
     values = pd.DataFrame({name: numbers_of(samples[name]) for name in (*COLUMNS[1:], *dots)})
     values = values.reset_index(drop=True)
     values[~(values.abs() < _LARGEST)] = np.nan
-    return {str(name): track for name, track in values.groupby(_names(samples["run"]).to_numpy(), sort=False)}
+    return {str(name): track for name, track in values.groupby(run_names(samples["run"]).to_numpy(), sort=False)}
 
 
 def _usable(track: pd.DataFrame, run: str, samples: pd.DataFrame, aside: list[str]) -> pd.DataFrame | None:
@@ -220,11 +220,6 @@ def _spins(track: pd.DataFrame, run: pd.Series, yaw: float) -> tuple[dict[str, f
         signed = spin.omega if spin.sign_seen else direction * sense * abs(spin.omega)
         spins |= {f"omega_{letter}_rpm": signed * 30 / math.pi, f"omega_{letter}_error": spin.error * 30 / math.pi}
     return spins, reasons
-
-
-def _names(column: pd.Series) -> pd.Series:
-    """Write the names of runs as text without blanks around it; a whole number has one spelling."""
-    return column.astype(str).fillna("").str.strip().str.replace(r"^0*([0-9]+)(?:\.0*)?$", r"\1", regex=True)
 
 
 def _listed(names: Collection[str]) -> str:

@@ -71,6 +71,11 @@ def read_tracks(path: str | Path, **options: Unpack[TrackOptions]) -> pd.DataFra
     return table
 
 
+def run_names(column: pd.Series) -> pd.Series:
+    """Write the names of runs as text without blanks around it; a whole number has one spelling."""
+    return column.astype(str).fillna("").str.strip().str.replace(r"^0*([0-9]+)(?:\.0*)?$", r"\1", regex=True)
+
+
 def _films(folder: Path, program: TrackingProgram) -> list[Path]:
     """List a folder's files of a program, one for each film."""
     films: dict[str, Path] = {}

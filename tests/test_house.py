@@ -83,7 +83,8 @@ def test_statistics_and_networks_know_no_robot() -> None:
         assert all(name.startswith(own) for name in others), file
     assert rooms["swimmer"] == set(below)
     for file in (ROOT / "calibration").rglob("*.py"):
-        assert not {name.split(".")[0] for name in imported(file)} & {"planner", "tracking"}, file
+        plans = {name.split(".")[0] for name in imported(file)} & {"planner", "tracking"}
+        assert not plans or file.parent.name == "swim", file
 
 
 def test_the_engine_of_a_verdict_knows_no_robot() -> None:

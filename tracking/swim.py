@@ -97,8 +97,9 @@ class Swim:
         columns = {
             "time_s": self.times * robot.time_scale, "x_cm": x * cm, "y_cm": y * cm,
             "heading_deg": np.degrees(heading), "time_bar": self.times, "x_over_l": x, "y_over_l": y,
-            "heading_rad": heading, "direction": self.direction.astype(int), "error_over_l": self.errors,
-            "plan_id": self.plan.identity,
+            "heading_rad": heading, "direction": self.direction.astype(int),
+            "dwell": np.cumsum(np.diff(self.direction, prepend=self.direction[0]) != 0),
+            "error_over_l": self.errors, "plan_id": self.plan.identity,
         }  # fmt: skip
         return with_units(pd.DataFrame(columns))
 

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 _COLUMNS = ("time_bar", "x_over_l", "y_over_l", "heading_rad")
 _ALIKE = 1e-3  # of a place and of the tail length, largest difference of the same place in cm and in l
-_LAB = ("time_s", "x_cm", "y_cm", "heading_deg")  # or in other units
+LAB = ("time_s", "x_cm", "y_cm", "heading_deg")  # or in other units
 _LARGEST = 1e6  # l, of a place; time units, of a time
 
 
@@ -130,11 +130,7 @@ def tracking_error(plan: Mapping[str, Any], track: pd.DataFrame) -> TrackingErro
         InputError: a column is missing, a value is no finite number, time goes back, or it is the track of
             another plan.
     """
-    others = set(track["plan_id"].dropna().astype(str)) - {plan["id"]} if "plan_id" in track else set()
-    if others:
-        raise InputError(
-            f"the track is of plan {min(others)}, not of {plan['id']}; compare it with its own plan.json"
-        )
+    check_plan_id(plan, track)
     times, poses = poses_of(track, plan["robot"])
     if not np.ptp(times) > 0:
         raise InputError("the track has no two times; give a row for each time, in order")
@@ -157,6 +153,15 @@ def tracking_error(plan: Mapping[str, Any], track: pd.DataFrame) -> TrackingErro
         track=tracked,
         tail_length=float(plan["robot"]["tail_length_m"]),
     )
+
+
+def check_plan_id(plan: Mapping[str, Any], track: pd.DataFrame) -> None:
+    """Refuse the track of another plan."""
+    others = set(track["plan_id"].dropna().astype(str)) - {plan["id"]} if "plan_id" in track else set()
+    if others:
+        raise InputError(
+            f"the track is of plan {min(others)}, not of {plan['id']}; compare it with its own plan.json"
+        )
 
 
 def read_track(track: pd.DataFrame | str | Path, **options: Unpack[TrackOptions]) -> pd.DataFrame:
@@ -202,8 +207,7 @@ def track_in_tails(track: pd.DataFrame, robot: Mapping[str, Any]) -> pd.DataFram
     Raises:
         InputError: a column is missing, or places in cm and in tail lengths differ: the track is of another robot.
     """
-    replayed = set(_COLUMNS) <= set(track)
-    lab = convert_columns(track.drop(columns=[*_COLUMNS]) if replayed else track, _LAB, "the track").table
+    replayed, lab = set(_COLUMNS) <= set(track), in_lab(track)
     cm = 100 * robot["tail_length_m"]
     if replayed:
         for over_l, in_cm in (("x_over_l", "x_cm"), ("y_over_l", "y_cm")):
@@ -217,12 +221,8 @@ def track_in_tails(track: pd.DataFrame, robot: Mapping[str, Any]) -> pd.DataFram
                     "the track of another robot"
                 )
         return track
-    for name in _LAB:
-        if name not in lab:
-            raise InputError(
-                f"the track has no column {name!r}; it needs time_s, x_cm, y_cm and heading_deg, or in other units"
-            )
-    values = {name: numbers_of(lab[name]) for name in _LAB}
+    require_lab(lab)
+    values = {name: numbers_of(lab[name]) for name in LAB}
     return pd.DataFrame(
         {
             "time_bar": values["time_s"] / robot["time_scale_s"],
@@ -231,6 +231,21 @@ def track_in_tails(track: pd.DataFrame, robot: Mapping[str, Any]) -> pd.DataFram
             "heading_rad": np.radians(values["heading_deg"]),
         }
     )
+
+
+def in_lab(track: pd.DataFrame) -> pd.DataFrame:
+    """Return a track, also one of a replay, with those of the columns LAB that it has in any unit."""
+    replayed = set(_COLUMNS) <= set(track)
+    return convert_columns(track.drop(columns=[*_COLUMNS]) if replayed else track, LAB, "the track").table
+
+
+def require_lab(track: pd.DataFrame) -> None:
+    """Refuse a track that lacks one of the columns LAB."""
+    for name in LAB:
+        if name not in track:
+            raise InputError(
+                f"the track has no column {name!r}; it needs time_s, x_cm, y_cm and heading_deg, or in other units"
+            )
 
 
 def draw_overlay(axes: Axes, plan: Mapping[str, Any], error: TrackingError, title: str) -> None:
