@@ -69,6 +69,19 @@ def by_differences(
     return predictions[0], np.moveaxis(slopes, 0, -1)
 
 
+def central(model: ForwardModel, at: Parameters, along: Sequence[Parameter], *, title: str = "") -> Predict:
+    """Make the linear model of a smooth model, by central differences: where misfits are many times the noise."""
+    sets, widths = [at], []
+    for p in along:
+        step = _LOG_STEP if p.logarithmic else _STEP * abs(p.typical)
+        ends = [p.moved(at[p.name], way * step) for way in (1, -1)]
+        sets += [{**at, p.name: end} for end in ends]
+        widths.append(float(p.change(ends[1], ends[0])))
+    predictions = model.predict(sets, title=title)
+    slopes = (predictions[1::2] - predictions[2::2]) / np.reshape(widths, (-1, 1, 1))
+    return linear(at, along, predictions[0], np.moveaxis(slopes, 0, -1))
+
+
 def secants(model: ForwardModel, at: Parameters, along: Sequence[Parameter], *, title: str = "") -> Predict:
     """Make the linear model of any model by its finite differences."""
     return linear(at, along, *by_differences(model, at, along, title=title))

@@ -22,7 +22,7 @@ from itertools import product
 import numpy as np
 
 from calibration.statistics.fit import fit
-from calibration.statistics.forward import secants
+from calibration.statistics.forward import central
 from calibration.statistics.statistical_model import Parameter, Parameters, Predict, start_values
 from calibration.swim.pose_noise import Sizes, estimate_noise
 from calibration.swim.sight import Sight
@@ -72,7 +72,7 @@ class FreeVehicle:
         self, at: Parameters, along: Sequence[Parameter], *, title: str = "", quick: bool = False
     ) -> Predict:
         """Return the linear model, by differences."""
-        return secants(self, at, along, title=title)
+        return central(self, at, along, title=title)
 
     def _changed(self, by: Parameters) -> Vehicle:
         """Change the vehicle by its numbers."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from calibration.statistics.budget import count_predictions
 from calibration.statistics.fit import fit
-from calibration.statistics.forward import secants
+from calibration.statistics.forward import central
 from calibration.statistics.statistical_model import ForwardModel, Parameter, Parameters, Predict, start_values
 from calibration.swim.course import Base, Near
 from calibration.swim.free_vehicle import with_noise
@@ -80,7 +80,7 @@ class SwimModel:
         self, at: Parameters, along: Sequence[Parameter], *, title: str = "", quick: bool = False
     ) -> Predict:
         """Return the linear model, by differences."""
-        return secants(self, at, along, title=title)
+        return central(self, at, along, title=title)
 
     def vehicles(self, sets: Sequence[Parameters]) -> list[tuple[Vehicle, float, float]]:
         """Make the vehicles of P parameter sets, with their units of time [s] and length [m]."""
