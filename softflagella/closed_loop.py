@@ -25,6 +25,7 @@ from common.units import LengthUnit
 
 if TYPE_CHECKING:
     from calibration.robot.robot_verdict import RobotVerdict
+    from calibration.swim.measured_swim import PlanSource
     from sim.robot_rows import OneRobot
 
 MAX_PREDICTIONS = 300_000  # of one run of a robot, for the search
@@ -42,6 +43,7 @@ def calibrate(
     laws: bool = True,
     paths: Sequence[str] = (),
     unit: LengthUnit | None = None,
+    plan: PlanSource | None = None,
     session: str | None = None,
     specimen: str | None = None,
     trace: str | None = None,
@@ -54,14 +56,16 @@ def calibrate(
     progress: bool = True,
     tell: Callable[[str], object] = lambda line: None,
 ) -> RobotVerdict | ModelVerdict:
-    """Fit a table of measured runs, find what the model lacks, and correct the robot, or a model of your own.
+    """Fit a table of measured runs, or the track of a swim, find what the model lacks, and correct the robot, or a model of your own.
 
-    `protocol`, `laws`, `paths` and `unit` are for a robot; `session`, `specimen`, `trace`, `held_out`, `noise` and
+    `protocol`, `laws`, `paths`, `unit` and `plan` are for a robot; `session`, `specimen`, `trace`, `held_out`, `noise` and
     `notes` are for a model of your own.
 
     Args:
         table: measured runs, one row for each run, or their file: `N`, `l_cm`, `omega_rpm` and two or more
-            of `omega_h_rpm`, `omega_t_rpm`, `omega_yr_rad_s`, `R_yr_cm`, `theta_deg`, `v_cm_s`; repeats.
+            of `omega_h_rpm`, `omega_t_rpm`, `omega_yr_rad_s`, `R_yr_cm`, `theta_deg`, `v_cm_s`; repeats. Or the track
+            of a swim along a path, one row for each pose: `time_s`, `x_cm`, `y_cm`, `heading_deg`, the motor's
+            `direction`, and `run` where there are several swims.
         robot: the robot as given, its robot.toml, or the name of a preset. In Python also a `Model` of your own;
             the columns of its table are those for which its function asks, and its outputs.
         protocol: what is fitted: all sessions but one ("session"), or N = 3 and 4 as in the paper ("paper").
@@ -74,6 +78,8 @@ def calibrate(
             corrected one is stated; `verdict.paths` has it.
         unit: of lengths that are given without one; l for tail lengths. 24cm and 3l, columns x_cm and y_cm, and
             drawings with a size have their own.
+        plan: plan.json of the path that was swum, for a track: its flips are exact, and a track without `direction`
+            has no others.
         session: COL, the column that says which runs were made together (default: session, if there is one).
         specimen: COL, the column that says what was run, where there are several.
         trace: COL, the column that says to which trace a reading belongs, where the model has a time. Without a
@@ -118,7 +124,8 @@ def calibrate(
     settings = own if isinstance(own, Mapping) else read_lab_settings(own or ())
     roles = Roles(session, specimen, held_out, noise, notes, trace)
     if isinstance(robot, Model):
-        _refuse("a model of your own", laws=not laws, paths=paths, unit=unit, protocol=protocol != "session")
+        _refuse("a model of your own", laws=not laws, paths=paths, unit=unit, plan=plan,
+                protocol=protocol != "session")  # fmt: skip
         with limited(limit):
             experiment, rows = read_runs_of(table, robot, roles, own=settings, title="checks" if progress else "")
             for line in (*experiment.runs.converted, *lines_of_excluded(experiment.runs)):
@@ -141,6 +148,7 @@ def calibrate(
         laws=laws,
         paths=paths,
         unit=unit,
+        plan=plan,
         limit=limit,
         jobs=jobs,
         progress=progress,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import pandas as pd
 
@@ -15,6 +15,8 @@ from calibration.robot.corrected_robot import check_given
 from calibration.robot.robot_verdict import RobotVerdict, read_runs
 from calibration.statistics.budget import Work
 from calibration.statistics.lab_settings import LabSettings
+from calibration.swim.calibrate_swims import calibrate_swims
+from calibration.swim.measured_swim import PlanSource, is_track, read_swims
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate
 from common.units import LengthUnit
@@ -33,6 +35,7 @@ def calibrate_robot(
     laws: bool,
     paths: Sequence[str],
     unit: LengthUnit | None,
+    plan: PlanSource | None,
     limit: Work,
     jobs: int | None,
     progress: bool,
@@ -42,14 +45,17 @@ def calibrate_robot(
     robot = one_robot(robot)
     check_given(robot)
     wanted = wanted_paths(paths, robot, unit)
-    data, rows = read_runs(table, protocol, tell)
-    result = calibrate(
-        SwimmerModel(robot, data, jobs, own=own),
-        held_out=rows,
-        describe=find_laws if laws else None,
-        limit=limit,
-        seed=seed,
-        progress=progress,
-        verdict=partial(RobotVerdict, robot=robot, table=name),
-    )
+    settings: dict[str, Any] = {
+        "limit": limit, "seed": seed, "progress": progress,
+        "verdict": partial(RobotVerdict, robot=robot, table=name),
+    }  # fmt: skip
+    if plan is not None or is_track(table):
+        swims = read_swims(table, plan)
+        for line in (line for swim in swims for line in swim.said):
+            tell(line)
+        result = calibrate_swims(robot, swims, jobs=jobs, **settings)
+    else:
+        data, rows = read_runs(table, protocol, tell)
+        model = SwimmerModel(robot, data, jobs, own=own)
+        result = calibrate(model, held_out=rows, describe=find_laws if laws else None, **settings)
     return replace(result, paths=path_errors(wanted, robot, result.corrected, result.knowledge))

@@ -137,9 +137,9 @@ def split_runs(data: Runs, held_out: Flags | None, outliers: tuple[Flags, tuple[
     held_out = middle_session(data) if held_out is None else held_out
     count = len(data.session_names)
     parted = divided(data, held_out)
-    group, names = groups(data) if parted else (data.session, data.session_names)
+    group, names = data.parts or (groups(data) if parted else (data.session, data.session_names))
     caveats: tuple[str, ...] = ()
-    if count < _FEWEST and parted:
+    if count < _FEWEST and parted and data.parts is None:
         caveat = (
             f"{count} session{'s' * (count > 1)} only: the held-out runs are a quarter of the conditions, not a "
             "session of their own, so the error on them does not contain the differences between sessions"

@@ -11,9 +11,9 @@ Lengths in m, times in s, headings in rad.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,9 +27,10 @@ from sim.mechanics import planar
 from sim.model.groups import Groups
 from sim.model.robot import Robot
 from sim.model.schedule import Schedule
-from sim.motion.replay import replay
+from sim.motion.replay import stretches
 from sim.motion.response import responses
 from sim.motion.steady import steady
+from sim.solve.march import YAW, X, Y
 
 _TOLERANCE, _MESHES = 1e-3, (4, 6)  # of the curves; differences of them count
 _SIDES = np.stack([np.ones(3), planar.MIRROR])
@@ -171,6 +172,7 @@ class Base:
 
     place: Floats  # (S,) dwells since the start, see `Moments.place`
     rest: Floats  # (S, 3), added to the changes of the vehicle [m, rad]
+    slopes: Mapping[str, Floats] = field(default_factory=dict)  # by the size of an effect, (S, 3)
 
     @classmethod
     def of(cls, swim: MeasuredSwim, robot: Robot, vehicle: Vehicle) -> Base:
@@ -179,23 +181,28 @@ class Base:
         schedule = Schedule(
             robot.group_values(), swim.first_direction, np.diff(swim.flips) / time, (0.0, 0.0, 0.0), time, length
         )
-        track = replay(schedule)
-        poses = track[["x_over_l", "y_over_l", "heading_rad"]].to_numpy() * [length, length, 1.0]
-        dwell = track["dwell"].to_numpy()[1:]
-        ends = np.flatnonzero(np.append(np.diff(dwell) > 0, True)) + 1
-        starts = np.concatenate([[0], ends[:-1]])  # the last pose of the dwell before
-        changes = planar.between(poses[starts][dwell], poses[1:])
-        elapsed = track["time_s"].to_numpy()[1:] - (swim.flips - swim.flips[0])[dwell]
+        simulated = [each for each in stretches(schedule) if len(each.times)]
+        dwell = np.concatenate([np.full(len(each.times), each.dwell) for each in simulated])
+        poses = np.concatenate([each.poses[:, [X, Y, YAW]] for each in simulated]) * [length, length, 1.0]
+        ends = np.concatenate([np.zeros((1, 3)), poses[np.flatnonzero(np.diff(dwell, append=-1))]])
+        elapsed = np.concatenate([each.times for each in simulated]) * time - (swim.flips - swim.flips[0])[dwell]
         at = Moments(dwell, elapsed, schedule.dwells * time, swim.first_direction)
-        rest = changes - at.changes(vehicle, time, length)
+        rest = planar.between(ends[dwell], poses) - at.changes(vehicle, time, length)
         marks = np.arange(len(swim.flips) - 1.0)
         place = np.concatenate([at.place, marks])
         order = np.argsort(place, kind="stable")
         return cls(place[order], np.concatenate([rest, np.zeros((len(marks), 3))])[order])
 
-    def at(self, place: Floats) -> Floats:
-        """Interpolate the rest at places (n,), (n, 3)."""
-        return np.stack([np.interp(place, self.place, column) for column in self.rest.T], -1)
+    def at(self, place: Floats, sizes: Mapping[str, Any]) -> Floats:
+        """Interpolate the rest at places (n,), (n, 3), with effects of some sizes above their null."""
+        rest = self.rest
+        for name, slope in self.slopes.items():
+            rest = rest + sizes.get(name, 0.0) * slope
+        return np.stack([np.interp(place, self.place, column) for column in rest.T], -1)
+
+    def with_slope(self, name: str, size: float, other: Base) -> Base:
+        """Learn the slope by an effect from the same robot with that effect."""
+        return replace(self, slopes={**self.slopes, name: (other.at(self.place, {}) - self.rest) / size})
 
 
 def course(changes: Floats, ends: Floats, at: Moments) -> tuple[Floats, Floats]:

@@ -30,6 +30,8 @@ from planner.files.saved_plan import load_plan
 from planner.planning.plan import Plan
 from tracking.tracks import LAB, check_plan_id, in_lab, require_lab
 
+PlanSource = str | Path | Mapping[str, Any] | Plan  # plan.json, its content, or a plan
+
 _FEWEST_DWELLS, _FEWEST_POSES = 12, 60
 _LARGEST = 1e9  # of a value
 _SIMULATED = {"dwell", "time_bar"}  # columns of a track of the simulator
@@ -56,7 +58,7 @@ class MeasuredSwim:
 
 def read_swims(
     source: str | Path | pd.DataFrame,
-    plan: str | Path | Mapping[str, Any] | Plan | None = None,
+    plan: PlanSource | None = None,
     **options: Unpack[TrackOptions],
 ) -> list[MeasuredSwim]:
     """Read the swims of a track, one for each `run`.

@@ -110,8 +110,8 @@ class Sight:
             moments, whole = Moments.of(swim, moment), Moments.whole(swim)
             changes, ends = (of.changes(vehicle, time, length) for of in (moments, whole))
             if self.bases:
-                changes = changes + self.bases[place].at(moments.place)
-                ends = ends + self.bases[place].at(whole.place)
+                changes = changes + self.bases[place].at(moments.place, value)
+                ends = ends + self.bases[place].at(whole.place, value)
             poses, flips = course(changes, ends, moments)
             for part in (2 * place, 2 * place + 1):
                 rows, first = runs.part[own] == part, first_of_last(swim) * (part % 2)

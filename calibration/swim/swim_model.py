@@ -93,11 +93,28 @@ class SwimModel:
     def based(self, at: Parameters) -> SwimModel:
         """Simulate the robot at some parameters along all swims, as the base of all others."""
         columns = self.robot.simulated([self.sight.without(at)]).columns
+        robot = {name: float(column[0]) for name, column in columns.items()}
+        model = replace(self, near=Near({**robot, "omega_bar": abs(robot["omega_bar"])}), began=dict(at))
+        return replace(model, sight=replace(self.sight, bases=model._bases(at)))
+
+    def learnt(self, sizes: Mapping[str, float]) -> SwimModel:
+        """Learn, for effects of some sizes, what the vehicle leaves out of them.
+
+        An effect may depend on the phase of the disc at the flips, which the vehicle averages.
+        """
+        sight = self.sight
+        for name, size in sizes.items():
+            null = next(effect.start for effect in self.effects if effect.name == name)
+            others = self._bases({**self.began, name: size})
+            bases = (base.with_slope(name, size - null, other) for base, other in zip(sight.bases, others, strict=True))
+            sight = replace(sight, bases=tuple(bases))
+        return replace(self, sight=sight)
+
+    def _bases(self, at: Parameters) -> tuple[Base, ...]:
+        """Simulate a robot along all swims."""
+        ((vehicle, _, _),) = self.vehicles([at])
         robot = self.robot.robots(self.sight.without(at))[0]
-        model = replace(self, near=Near({name: abs(float(column[0])) if name == "omega_bar" else float(column[0]) for name, column in columns.items()}))
-        ((vehicle, _, _),) = model.vehicles([at])
-        bases = tuple(Base.of(swim, robot, vehicle) for swim in self.runs.swims)
-        return replace(model, sight=replace(self.sight, bases=bases), began=dict(at))
+        return tuple(Base.of(swim, robot, vehicle) for swim in self.runs.swims)
 
 
 def swim_model(

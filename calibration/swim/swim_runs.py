@@ -36,6 +36,16 @@ class SwimRuns(Runs):
     length: float  # the tail length as given [m]
     noise_of_poses: PoseNoise | None = None  # with it y is white, and so is what is predicted
 
+    @property
+    def settings(self) -> dict[str, tuple[Floats, str]]:
+        return {"time": (self.inputs[:, 0], " s")}
+
+    @property
+    def drawn(self) -> tuple[str, tuple[str, Integers, tuple[str, ...]]]:
+        """The time, and the direction of the motor in colour."""
+        turning = self.inputs[:, 1] > 0
+        return "time", ("motor", turning.astype(int), ("motor at −1", "motor at +1"))
+
     def in_noise(self, sizes: Sizes, course: Floats) -> SwimRuns:
         """Return the same poses white in a noise, along a course (n, 3) without it."""
         time = np.concatenate([swim.time for swim in self.swims])
@@ -54,6 +64,10 @@ class SwimRuns(Runs):
     def along(self) -> Floats:
         """Zero: a shift of all poses is that of the start."""
         return np.zeros(len(self))
+
+    @property
+    def parts(self) -> tuple[Integers, tuple[str, ...]]:
+        return self.part, self.part_names
 
     @property
     def together(self) -> Integers:
@@ -104,7 +118,7 @@ def runs_of_swims(swims: Sequence[MeasuredSwim], length: float) -> tuple[SwimRun
         heads.append(head)
         order = np.concatenate([np.arange((~late).sum()) / (~late).sum(), 1 + np.arange(late.sum()) / late.sum()])
         block.append(2 * _BLOCKS * place + np.minimum((order * _BLOCKS).astype(int), 2 * _BLOCKS - 1))
-        names += [f"{swim.name}, first part", f"{swim.name}, last part"]
+        names += [f"first part of {swim.name}", f"last third of {swim.name}"]
     poses = np.concatenate([swim.poses for swim in swims]) / [length, length, 1.0]
     count, numbers = len(poses), [len(swim.time) for swim in swims]
     moment = np.concatenate([swim.time - swim.flips[0] for swim in swims])

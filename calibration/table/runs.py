@@ -96,6 +96,11 @@ class Runs:
         """Whiten a table (n, …) along traces."""
         return table if self.memory is None else self.memory.whiten(table)
 
+    @property
+    def parts(self) -> tuple[Integers, tuple[str, ...]] | None:
+        """Number and name what is held out, (n,), where it is neither sessions nor blocks of them."""
+        return None
+
     def white_features(self, table: Floats) -> Floats:
         """Whiten features (n, f), which an output may follow, along traces."""
         return self.whitened(table)

@@ -59,7 +59,7 @@ def _shared_scale(record: Record) -> tuple[float, str]:
     scales = {(scale, unit) for scale, unit in record.get("output_scales", {}).values()} or {(100.0, "%")}
     if len(scales) == 1:
         return scales.pop()
-    return (100.0, "%") if all(scale != 1 for scale, _ in scales) else (1.0, _SEVERAL)
+    return (100.0, "%") if {unit for _, unit in scales} <= {"%", "°"} else (1.0, _SEVERAL)
 
 
 def feature_in_words(name: str) -> str:
