@@ -93,7 +93,7 @@ def test_rests_of_the_motor_are_left_out() -> None:
     swum = read(table.assign(direction=table["direction"] * ~rests))
     assert len(swum.dwells) == 38
     assert swum.flips[0] == pytest.approx(FLIPS[20] + 8.2, abs=0.4)
-    assert "the motor rests 1 times in between" in swum.said[0]
+    assert "the motor rests in between; kept is the longest part" in swum.said[0]
 
 
 def test_outliers_are_dropped_and_flips_are_none() -> None:
