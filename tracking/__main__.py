@@ -10,7 +10,7 @@ from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any
 
 from common.changes import RobotSource
-from common.commands import Call, Program
+from common.commands import Call, Program, to_stderr
 from common.errors import InputError
 from common.units import format_length, format_time
 
@@ -61,6 +61,7 @@ def _track(
     from planner.progress import plan_bar
     from tracking.pipe import answers
     from tracking.tracker import Tracker
+    from tracking.tracks import what_next
 
     _check_options(noise_rad, latency, lost_seconds)
     if camera is None and (view or serial or lost_seconds or show):
@@ -93,8 +94,12 @@ def _track(
         tracker: Tracker | None = begin(read_pose(start, unit, plan.robot, "--start"), 0.0)
     else:
         tracker = None if saved else begin(None, 0.0)
+    alarmed = False
     for answer in answers(tracker, sys.stdin, plan.robot, begin):
         print(answer, flush=True)
+        alarmed = alarmed or answer.endswith(" 1")
+    if alarmed and (line := what_next(plan.to_dict(), "track.csv")):
+        to_stderr(f"alarm: the robot does not swim as planned; {line}")
 
 
 def _check_options(noise_rad: float, latency: float, lost_seconds: float | None) -> None:
@@ -115,16 +120,19 @@ def _live(
     from tracking.live import Motor, Pictures, Ride, Sight, ending_on_signals, steer, watch
     from tracking.live_page import LivePage
     from tracking.printer import Printer
+    from tracking.tracks import what_next
 
     length = plan.robot.length_scale
     page, told, rows = LivePage(plan.reference, length), Printer(sys.stderr), Printer(sys.stdout)
 
     def row(sight: Sight, direction: int, error: float, alarm: bool, flip_in: float) -> None:
         page.show(sight, direction, error, alarm, flip_in)
-        if sight.pose is not None:
-            x, y, heading = sight.pose
-            place = f"{100 * length * x:.4f},{100 * length * y:.4f},{math.degrees(heading):.3f}"
-            rows(f"{sight.time:.4f},{place},{direction},{100 * length * error:.4f},{alarm:d}")
+        x, y, heading = sight.pose or (math.nan,) * 3
+        numbers = f"{100 * length * x:.4f}", f"{100 * length * y:.4f}", f"{math.degrees(heading):.3f}"
+        if sight.is_picture:
+            bound = f"{100 * length * error:.4f}"
+            line = ",".join([f"{sight.time:.4f}", *numbers, f"{direction}", bound, f"{alarm:d}"])
+            rows(line.replace("nan", ""))
 
     def tell(line: str) -> None:
         page.tell(line)
@@ -149,6 +157,8 @@ def _live(
                 tell("stopped on the live page")
             if ride.pictures:
                 tell(ride.line())
+            if ride.alarms and (line := what_next(plan.to_dict(), "track.csv")):
+                tell(line)
 
 
 def _saved(path: str, *, unit: str | None = None, lookup: str | None = None, own_table: bool = False,
@@ -241,7 +251,7 @@ def _check(check: Call, plan: str, track: str, *, out: str | None = None) -> Non
         out: overlay picture, PNG.
     """
     from planner.files.saved_plan import load_plan
-    from tracking.tracks import MissedPathError, write_overlay
+    from tracking.tracks import MissedPathError, what_next, write_overlay
 
     content = load_plan(plan)
     error = check(plan=content, track=track)
@@ -249,7 +259,10 @@ def _check(check: Call, plan: str, track: str, *, out: str | None = None) -> Non
     if out is not None:
         write_overlay(out, content, error)
         print(f"-> {out}")
-    if error.declared_missed > error.stated:
+    missed = error.declared_missed > error.stated
+    if (missed or error.largest > error.stated) and (line := what_next(content, track, plan, check.given)):
+        print(line)
+    if missed:
         raise MissedPathError(f"{track} misses a part of the declared path")
 
 

@@ -49,7 +49,12 @@ class Sight(NamedTuple):
 
     time: float
     pose: POSE | None
-    why: str = ""  # there is no pose
+    why: str = ""  # a picture shows no pose
+
+    @property
+    def is_picture(self) -> bool:
+        """Whether there is a picture."""
+        return self.pose is not None or bool(self.why)
 
 
 Clock = Callable[[], float]  # -> time since the beginning [s]
@@ -186,8 +191,8 @@ def steer(
         begin: makes a tracker that begins at rest at a pose and a time [μ0 l⁴/EI].
         unit: of the tracker's time [s].
         lost: time without a pose after which the motor rests [s].
-        row: is given each sight, an empty one where none has come, the direction ordered then, the tracker's bound
-            on the error [l], its alarm, and the time until the next flip [s].
+        row: is given each sight, one without a pose where none has come, the direction of the motor at its time,
+            the tracker's bound on the error [l], its alarm, and the time until the next flip [s].
         tell: is given what the user should know at once.
         stopped: whether the motor is to stop now.
 
@@ -196,20 +201,20 @@ def steer(
     """
     tracker: Tracker | None = None
     direction, flip_at, error, alarm, waiting = 0, math.inf, math.nan, False, True
-    seen_at = ordered_at = pictures.now()
-    nothing = Sight(0.0, None)
+    seen_at = ordered_at = turned_at = pictures.now()
+    earlier = 0  # direction before `turned_at`
     while not ride.finished and not stopped():
         # Wait for a picture, but no longer than until the next flip, or until the board needs a sign of life.
         try:
             sight = pictures.get(max(min(ordered_at + REPEAT, flip_at) - pictures.now(), 0.0))
         except TimeoutError:
-            sight = nothing
+            sight = Sight(pictures.now(), None)
         if sight is None:
             break
         now = pictures.now()
         seen_at = seen_at if sight.pose is None else sight.time
         ride.missing = sight.why or ride.missing
-        held_up = now - ordered_at >= WATCHDOG
+        held_up, before = now - ordered_at >= WATCHDOG, direction
         # After a pause the pose is unknown: rest, and begin again at the first pose that is seen.
         if tracker is not None and (held_up or now - seen_at > lost):
             why = "the program was held up" if held_up else f"no robot for {lost:g} s ({ride.missing})"
@@ -217,7 +222,7 @@ def steer(
             tracker, direction, flip_at, error, alarm = None, 0, math.inf, math.nan, False
             ride.rests += 1
         elif tracker is not None or sight.pose is not None:
-            due, before = flip_at, direction
+            due = flip_at
             if tracker is not None:
                 command = tracker.update(now / unit, sight.pose, sight.time / unit)
             elif sight.pose is not None:
@@ -235,10 +240,13 @@ def steer(
             waiting = False
         motor.turn(0 if stopped() else direction)
         ordered_at = now
-        if sight is not nothing:
+        if direction != before:
+            turned_at, earlier = now, before
+        if sight.is_picture:
             ride.pictures += 1
             ride.delays += [pictures.now() - sight.time] * (sight.pose is not None)
-        row(sight, direction, error, alarm, flip_at - now)
+        # A picture is older than the order that follows it.
+        row(sight, direction if sight.time >= turned_at else earlier, error, alarm, flip_at - now)
     motor.turn(0)
 
 

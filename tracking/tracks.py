@@ -7,6 +7,7 @@ from the path as given is computed, too.
 
 from __future__ import annotations
 
+import shlex
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -29,6 +30,7 @@ from planner.paths.distance import distance_to, farthest
 from planner.paths.units import missed_words
 from planner.planning.plan import Plan
 from sim.mechanics import planar
+from sim.model.presets import PRESETS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
 _COLUMNS = ("time_bar", "x_over_l", "y_over_l", "heading_rad")
 _ALIKE = 1e-3  # of a place and of the tail length, largest difference of the same place in cm and in l
 LAB = ("time_s", "x_cm", "y_cm", "heading_deg")  # or in other units
+_NONE: Mapping[str, Any] = {}
 _LARGEST = 1e6  # l, of a place; time units, of a time
 
 
@@ -132,7 +135,7 @@ def tracking_error(plan: Mapping[str, Any], track: pd.DataFrame) -> TrackingErro
     """
     check_plan_id(plan, track)
     times, poses = poses_of(track, plan["robot"])
-    if not np.ptp(times) > 0:
+    if len(times) < 2 or not np.ptp(times) > 0:
         raise InputError("the track has no two times; give a row for each time, in order")
     offset = np.array([plan.get("offset_over_l", 0.0), 0.0, 0.0])
     tracked = planar.compose(poses, offset)[:, :2]
@@ -179,7 +182,7 @@ def read_track(track: pd.DataFrame | str | Path, **options: Unpack[TrackOptions]
 
 
 def poses_of(track: pd.DataFrame, robot: Mapping[str, Any]) -> tuple[Floats, Floats]:
-    """Return times (N,) and poses (N, 3) of a track, in time units, l and rad.
+    """Return times (N,) and poses (N, 3) of a track, in time units, l and rad, of the rows that have a pose.
 
     Args:
         track: the table.
@@ -190,7 +193,9 @@ def poses_of(track: pd.DataFrame, robot: Mapping[str, Any]) -> tuple[Floats, Flo
     """
     table = track_in_tails(track, robot)
     rows = np.stack([numbers_of(table[name]).to_numpy() for name in _COLUMNS], 1)
-    bad = np.flatnonzero(~(np.abs(rows) < _LARGEST).all(1))
+    seen = ~np.isnan(rows[:, 1:]).all(1)
+    fine = np.abs(rows) < _LARGEST
+    bad = np.flatnonzero(~fine[:, 0] | (seen & ~fine.all(1)))
     if len(bad):
         raise InputError(
             f"row {bad[0] + 1} of the track has a value that is not a finite number; correct the file"
@@ -198,7 +203,7 @@ def poses_of(track: pd.DataFrame, robot: Mapping[str, Any]) -> tuple[Floats, Flo
     back = np.flatnonzero(np.diff(rows[:, 0]) < 0)
     if len(back):
         raise InputError(f"the track's time goes back at row {back[0] + 2}; give a row for each time, in order")
-    return rows[:, 0], rows[:, 1:]
+    return rows[seen, 0], rows[seen, 1:]
 
 
 def track_in_tails(track: pd.DataFrame, robot: Mapping[str, Any]) -> pd.DataFrame:
@@ -246,6 +251,31 @@ def require_lab(track: pd.DataFrame) -> None:
             raise InputError(
                 f"the track has no column {name!r}; it needs time_s, x_cm, y_cm and heading_deg, or in other units"
             )
+
+
+def what_next(
+    plan: Mapping[str, Any], track: str, plan_file: str | None = None, options: Mapping[str, Any] = _NONE
+) -> str:
+    """Say how a track tells what the model lacks: one line, empty for a measured vehicle, which has no model.
+
+    Args:
+        plan: content of plan.json.
+        track: file of the track.
+        plan_file: file of the plan, where the track may need it; a tracker's track has flips of its own.
+        options: see `TrackOptions`; those without a value are left out.
+    """
+    robot = plan["robot"]
+    if "vehicle" in robot:
+        return ""
+    preset = PRESETS.get(robot["name"])
+    own = preset is None or (preset.group_values(), preset.time_scale) != (robot["groups"], robot["time_scale_s"])
+    words = [track, "--robot", "robot.toml" if own else robot["name"]]
+    words += [] if plan_file is None else ["--plan", plan_file]
+    for name in TrackOptions.__annotations__:
+        if (value := options.get(name)) is not None:
+            words.append("--from" if name == "written_by" else f"--{name}")
+            words += [f"{number:g}" for number in value] if name == "origin" else [str(value)]
+    return f"find out what the model lacks: softflagella calibrate {shlex.join(words)}"
 
 
 def draw_overlay(axes: Axes, plan: Mapping[str, Any], error: TrackingError, title: str) -> None:

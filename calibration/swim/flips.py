@@ -89,7 +89,7 @@ def motor_by_rows(time: Floats, direction: Floats, *, exact: bool) -> tuple[Moto
     said = []
     if len(parts) > 1:
         part = f"{format_time(begin)} to {format_time(over)}"
-        said.append(f"the motor rests {len(parts) - 1} times in between; kept is the longest part, {part}")
+        said.append(f"the motor rests in between; kept is the longest part, {part}")
     return Motor(int(direction[first]), flips, error, unseen=np.stack([rows[gaps], rows[gaps + 1]], 1)), said
 
 

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from calibration.findings.next_runs import read_explanations
+from calibration.swim.measured_swim import read_swims
 from calibration.swimmer.measured_table import read_measurements
 from camera.measured_runs import measure_tracks
 from camera.pose_tracks import read_tracks
@@ -40,6 +41,7 @@ from sim.model.robot_toml import robot_toml
 from sim.model.schedule import load_schedule
 from surrogate.robot_table import load_robot_table
 from surrogate.table_file import SHIPPED, load
+from tests.calibration.zigzag import PLAN, track
 from tests.camera import tracked_files
 from tests.oracles.example_files import (
     JSON,
@@ -214,6 +216,13 @@ def _measure(path: Path) -> None:
         assert name not in table or not np.isinf(table[name]).any(), "a result is infinite"
 
 
+def _read_swims(plan: dict[str, Any] | None, path: Path) -> None:
+    for swum in read_swims(path, plan):
+        _finite(swum.time, swum.poses, swum.flips, swum.flip_error)
+        assert (np.diff(swum.time) > 0).all(), "times do not increase"
+        assert (swum.dwells > 0).all(), "a dwell has no length"
+
+
 def _read_tracks(source: Source, options: dict[str, Any], path: Path) -> None:
     table = read_tracks(path, written_by=source, **options)
     _finite(table.drop(columns="run"))
@@ -279,6 +288,13 @@ FORMATS: dict[str, FileFormat] = {
     ),
     "runs of camera tracks": FileFormat(
         file("runs.csv", lambda: text(NOTED), tracks_csv=lambda: text(samples())), _measure, TABLE
+    ),
+    "swim": FileFormat(
+        file("track.csv", lambda: text(track(1.2).round(4))), partial(_read_swims, None), TABLE
+    ),
+    "swim as planned": FileFormat(
+        file("track.csv", lambda: text(track(1.2).round(4).drop(columns="direction"))),
+        partial(_read_swims, PLAN), TABLE,
     ),
     "DeepLabCut": _tracked("a.csv", "deeplabcut", tracked_files.deeplabcut, scale="0.5mm", fps=25.0),
     "SLEAP": _tracked("a.csv", "sleap", tracked_files.sleap, scale="0.5mm", fps=25.0),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import re
 import signal
@@ -9,7 +10,7 @@ import subprocess
 import sys
 import time
 import tty
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -17,15 +18,18 @@ import numpy as np
 import pytest
 
 from common.errors import InputError
+from common.tables import read_table
 from planner.files.plan_files import write_plan
 from planner.paths.distance import distance_to
 from sim.mechanics.planar import POSE
 from tests.planner.plans import planned
 from tests.processes import LIMIT, ROOT
 from tracking import live
+from tracking.__main__ import main
 from tracking.live import REPEAT, Clock, Motor, Pictures, Ride, Sight, steer
 from tracking.swim import SteppedSwimmer
 from tracking.tracker import Tracker
+from tracking.tracks import poses_of
 
 UNIT = planned().robot.time_scale
 DELAY = 0.12  # s, from a picture to its pose
@@ -150,13 +154,63 @@ def test_an_alarm_is_told_once_and_stands_in_the_track() -> None:
     assert rows[-1][3]
 
 
+def test_the_track_has_the_direction_at_the_time_of_each_picture() -> None:
+    """A picture is older than the order that follows it."""
+    tank, rows = FilmedTank(blind=(20.0, 40.0), over=60.0), list[tuple[Sight, int]]()
+    row = lambda sight, direction, *_: rows.append((sight, direction))  # noqa: E731
+    steer(Ride(), tank, tank, begin, UNIT, lost=LOST, row=row, tell=print)
+    when, ordered = np.array(tank.orders).T
+    pictures = [each for each in rows if each[0].is_picture]
+    times, directions = np.array([sight.time for sight, _ in pictures]), np.array([each for _, each in pictures])
+    assert np.diff(times) == pytest.approx(0.5)
+    assert (directions == ordered[np.searchsorted(when, times, side="right") - 1])[1:].all()
+    assert set(directions) == {-1, 0, 1}
+    assert directions[0] == 0
+
+
+def test_an_alarm_ends_with_the_way_to_the_calibration(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Live and on the pipe; pictures without a pose are part of the track."""
+    path = str(write_plan(LINE, tmp_path)[0])
+    line = "find out what the model lacks: softflagella calibrate track.csv --robot paper-control"
+
+    def steered_by(alarms: int) -> list[str]:
+        def steer_by(ride: Ride, *_: object, row: Callable[..., object], **__: object) -> None:
+            ride.pictures, ride.alarms = 1, alarms
+            row(Sight(1.0, None, "dark"), 0, np.nan, False, np.inf)
+            row(Sight(1.5, (0.7, 1.0, 0.0)), 1, 0.02, False, 1.0)
+            row(Sight(2.0, None, "dark"), 1, 0.02, True, 1.0)
+            row(Sight(2.2, None), 1, 0.02, True, 1.0)
+
+        monkeypatch.setattr(live, "steer", steer_by)
+        main(["track", path, "--camera", "0", "--view", "view.toml"])
+        told = capfd.readouterr()
+        (tmp_path / "track.csv").write_text(told.out)
+        return told.err.splitlines()
+
+    monkeypatch.setattr(live, "watch", lambda *_: lambda now: iter(()))
+    assert line not in steered_by(0)
+    assert steered_by(1)[-1] == line
+    table = read_table(tmp_path / "track.csv")
+    assert table["direction"].tolist() == [0, 1, 1]
+    assert table["x_cm"].isna().tolist() == [True, False, True]
+    times, poses = poses_of(table, LINE.to_dict()["robot"])
+    assert (len(times), poses[0, :2]) == (1, pytest.approx([0.7, 1.0], abs=1e-4))
+    away = "".join(f"{time} 90 90 2\n" for time in range(30))
+    for lines, last in ((f"0 0.7 1.0 0\n{away}", True), ("0 0.7 1.0 0\n1\n", False)):
+        monkeypatch.setattr("sys.stdin", io.StringIO(lines))
+        main(["track", path])
+        assert (line in capfd.readouterr().err) == last
+
+
 def test_a_motor_that_rests_is_told_of_without_a_picture_and_a_stop_comes_at_once() -> None:
     tank, told = FilmedTank(), list[tuple[float, int]]()
     tank.next = np.inf  # the camera hangs
     tank.sights = [Sight(0.0, tuple(tank.pose.tolist()))]
     row = lambda *row: told.append((tank.time, row[1]))  # noqa: E731
     steer(Ride(), tank, tank, begin, UNIT, lost=LOST, row=row, tell=print, stopped=lambda: tank.time > 5.0)
-    assert told[0][1] != 0
+    assert [direction != 0 for _, direction in told[:2]] == [False, True]  # the picture is older than the order
     assert min(when for when, direction in told if direction == 0) < LOST + 2 * REPEAT
     assert tank.time < 5.0 + 2 * REPEAT
     assert tank.orders[-1] == (tank.time, 0)

@@ -25,7 +25,7 @@ from softflagella.__main__ import main
 from tests.camera.tracked_files import deeplabcut, two_robots
 from tests.planner.compiled import compile_c
 from tests.planner.plans import CONTROL, planned, predicted_track
-from tracking.tracks import check, tracking_error
+from tracking.tracks import check, tracking_error, what_next
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -199,13 +199,25 @@ def test_check_of_a_track_that_misses_a_part_ends_with_status_3(
     track.to_csv(whole, index=False)
     track.head(len(track) // 2).to_csv(part, index=False)
     assert run_command(main, ["check", str(json_file), str(whole)]) == 0
-    capsys.readouterr()
+    (line,) = capsys.readouterr().out.splitlines()
+    assert "within the stated error" in line
     overlay = tmp_path / "overlay.png"
     assert run_command(main, ["check", str(json_file), str(part), "--out", str(overlay)]) == 3
     told = capsys.readouterr()
     assert told.out.startswith("MISSED a part of the declared path")
     assert told.err == f"error: {part} misses a part of the declared path\n"
+    words = f"softflagella calibrate {part} --robot paper-control --plan {json_file}"
+    assert told.out.splitlines()[1:] == [f"-> {overlay}", f"find out what the model lacks: {words}"]
     assert overlay.exists()
+
+
+def test_what_is_next_names_the_robot_as_far_as_it_is_known() -> None:
+    """A preset by its name, unless it was changed; a measured vehicle has no model that could lack anything."""
+    record = planned().to_dict()
+    assert what_next(record, "my track.csv").endswith(" calibrate 'my track.csv' --robot paper-control")
+    changed = {**record, "robot": {**record["robot"], "time_scale_s": 1.1 * record["robot"]["time_scale_s"]}}
+    assert what_next(changed, "track.csv").endswith(" calibrate track.csv --robot robot.toml")
+    assert what_next({**record, "robot": {"name": "toy", "vehicle": {}}}, "track.csv") == ""
 
 
 def test_tracks_of_another_program_are_read_as_options_say(
@@ -220,7 +232,11 @@ def test_tracks_of_another_program_are_read_as_options_say(
     words = ["--from", "deeplabcut", "--scale", "0.5mm", "--fps", "25", "--origin", "900", "700"]
     with pytest.raises(InputError, match="misses a part of the declared path"):
         main(["check", str(json_file), str(file), *words])
-    assert capsys.readouterr() == (f"{wanted.line}\n", f"{file}: 1 of 40 poses are lost\n")
+    out, err = capsys.readouterr()
+    assert err == f"{file}: 1 of 40 poses are lost\n"
+    told, line = out.splitlines()
+    assert told == wanted.line
+    assert line.endswith(f"--plan {json_file} --from deeplabcut --scale 0.5mm --fps 25.0 --origin 900 700")
     with pytest.warns(UserWarning, match="1 of 40 poses are lost") as warned:
         assert check(json_file, file, **options, origin=(900.0, 700.0)).rms == wanted.rms
     assert [each.filename for each in warned] == [__file__]
