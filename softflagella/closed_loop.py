@@ -56,15 +56,15 @@ def calibrate(
     progress: bool = True,
     tell: Callable[[str], object] = lambda line: None,
 ) -> RobotVerdict | ModelVerdict:
-    """Fit a table of measured runs, or the track of a swim, find what the model lacks, and correct the robot, or a model of your own.
+    """Fit measured runs, or a swim, find what the model lacks, and correct the robot, or a model of your own.
 
-    `protocol`, `laws`, `paths`, `unit` and `plan` are for a robot; `session`, `specimen`, `trace`, `held_out`, `noise` and
-    `notes` are for a model of your own.
+    `protocol`, `laws`, `paths`, `unit` and `plan` are for a robot; `session`, `specimen`, `trace`, `held_out`,
+    `noise` and `notes` are for a model of your own.
 
     Args:
         table: measured runs, one row for each run, or their file: `N`, `l_cm`, `omega_rpm` and two or more
-            of `omega_h_rpm`, `omega_t_rpm`, `omega_yr_rad_s`, `R_yr_cm`, `theta_deg`, `v_cm_s`; repeats. Or the track
-            of a swim along a path, one row for each pose: `time_s`, `x_cm`, `y_cm`, `heading_deg`, the motor's
+            of `omega_h_rpm`, `omega_t_rpm`, `omega_yr_rad_s`, `R_yr_cm`, `theta_deg`, `v_cm_s`; repeats. Or the
+            track of a swim, one row for each pose: `time_s`, `x_cm`, `y_cm`, `heading_deg`, the motor's
             `direction`, and `run` where there are several swims.
         robot: the robot as given, its robot.toml, or the name of a preset. In Python also a `Model` of your own;
             the columns of its table are those for which its function asks, and its outputs.
@@ -78,8 +78,8 @@ def calibrate(
             corrected one is stated; `verdict.paths` has it.
         unit: of lengths that are given without one; l for tail lengths. 24cm and 3l, columns x_cm and y_cm, and
             drawings with a size have their own.
-        plan: plan.json of the path that was swum, for a track: its flips are exact, and a track without `direction`
-            has no others.
+        plan: plan.json of the path that was swum, for a track: its flips are exact, and a track without
+            `direction` has no others.
         session: COL, the column that says which runs were made together (default: session, if there is one).
         specimen: COL, the column that says what was run, where there are several.
         trace: COL, the column that says to which trace a reading belongs, where the model has a time. Without a

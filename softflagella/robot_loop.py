@@ -11,11 +11,11 @@ from typing import Any, Literal
 import pandas as pd
 
 from calibration.laws.laws import find_laws
+from calibration.robot.calibrate_swims import calibrate_swims
 from calibration.robot.corrected_robot import check_given
 from calibration.robot.robot_verdict import RobotVerdict, read_runs
 from calibration.statistics.budget import Work
 from calibration.statistics.lab_settings import LabSettings
-from calibration.swim.calibrate_swims import calibrate_swims
 from calibration.swim.measured_swim import PlanSource, is_track, read_swims
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate
@@ -49,6 +49,7 @@ def calibrate_robot(
         "limit": limit, "seed": seed, "progress": progress,
         "verdict": partial(RobotVerdict, robot=robot, table=name),
     }  # fmt: skip
+    result: RobotVerdict
     if plan is not None or is_track(table):
         swims = read_swims(table, plan)
         for line in (line for swim in swims for line in swim.said):

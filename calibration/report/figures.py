@@ -54,6 +54,11 @@ _CURVES = (
     "Below: measured minus model, of every trace that was fitted."
 )
 
+_TRACK = (
+    "The track as it was measured, and as models predict it: freely from the start of each part, with all flips "
+    "of the motor. The held-out part is dotted in black; its start is fitted to its first fifth."
+)
+
 Drawn = tuple[Figure, str, str]  # with a description and a caption
 
 
@@ -71,6 +76,10 @@ def draw_all(result: Findings) -> dict[str, list[Drawn]]:
     else:
         figures["residuals"] = lambda: [(figure, f"residuals by output and {kind}, {model}", model)
                                         for figure, model in draw_residuals(result)]  # fmt: skip
+    if result.runs.plane is not None:
+        figures["track"] = lambda: [
+            (draw_track(result), "the track in the plane, measured and by each model", _TRACK)
+        ]
     figures["maps"] = lambda: [(figure, f"map of the residual over the runs' inputs, {model}", model)
                                for figure, model in draw_maps(result)]  # fmt: skip
     if result.attribution.misfit.critical_z > 0:  # else no effect can be told from the numbers
@@ -170,6 +179,33 @@ def draw_curves(result: Findings) -> list[tuple[Figure, str]]:
     gains = [errors["after"][name] / max(errors["before"][name], _LEAST) for name in data.outputs]
     shown = sorted(np.argsort(gains, kind="stable")[:_OUTPUTS].tolist())
     return [(_draw_curves(result, k), data.title_of(data.outputs[k])) for k in shown]
+
+
+def draw_track(result: Findings) -> Figure:
+    """Draw what was measured along a track in the plane, and what each model predicts of it."""
+    data = result.runs
+    assert data.plane is not None
+    places = [data.outputs.index(name) for name in data.plane]
+    factor, unit = data.scale_of(data.plane[0])
+    figure = Figure(figsize=(_WIDTH, _WIDTH), layout="constrained")
+    axes = figure.add_subplot()
+    for rows, style in (
+        (~result.split.test, {"lw": 2.5, "color": PALE}),
+        (result.split.test, {"ls": ":", "color": INK}),
+    ):
+        seen = factor * np.where(rows[:, None], data.raw(data.y)[:, places], np.nan)
+        axes.plot(*seen.T, **style, label="measured" + ", held out" * bool(rows[-1]))
+    for (name, prediction), colour in zip(compared(result), (ORANGE, GREEN), strict=False):
+        of_parts = data.raw(prediction)[:, places]
+        if data.parts is not None:  # a part begins where it was, not where the one before has led
+            of_parts = np.insert(of_parts, np.flatnonzero(np.diff(data.parts[0])) + 1, np.nan, axis=0)
+        axes.plot(*(factor * of_parts.T), color=colour, lw=0.9, label=name)
+    axes.set_aspect("equal")
+    axes.set_xlabel(f"{data.plane[0]} [{unit}]", fontsize=9)
+    axes.set_ylabel(f"{data.plane[1]} [{unit}]", fontsize=9)
+    axes.tick_params(labelsize=8)
+    figure.legend(loc="outside upper center", fontsize=8, frameon=False, ncols=2)
+    return figure
 
 
 def _draw_curves(result: Findings, k: int) -> Figure:

@@ -2,8 +2,8 @@
 
 One robot, the base, is simulated in time steps (`sim.motion.replay`). Its motion in a dwell is that of the
 planner's vehicle (`planner.vehicle.vehicle`), lag and arc, and a small rest, which the vehicle leaves out. Other
-robots have the rest of the base, twists of their own, solved for directly, and lags by their derivatives. So what a
-number changes costs a hundredth of a second, and the rest falls out of differences.
+robots have the rest of the base, twists of their own, solved for directly, and lags by their derivatives. So what
+a number changes costs a hundredth of a second, and the rest falls out of differences.
 
 Lengths in m, times in s, headings in rad.
 """
@@ -92,7 +92,8 @@ class Near:
         wanted = [each for each in wanted if each not in self.known]
         if not wanted:
             return
-        every = [*wanted, *(("", sense) for sense in dict.fromkeys(s for _, s in wanted) if ("", sense) not in wanted)]
+        at_robot = [("", sense) for sense in sorted({sense for _, sense in wanted})]
+        every = [*at_robot, *(each for each in wanted if each not in at_robot)]
         names = {*self.robot, *(name for name, _ in wanted if name)}
         columns = {name: np.full(len(every), self._value(name)) for name in names}
         steps = np.zeros(len(every))
@@ -151,7 +152,7 @@ class Moments:
     @property
     def place(self) -> Floats:
         """Dwells since the start, with the share of the present one, (n,)."""
-        return self.dwell + np.clip(self.elapsed / self.dwells[self.dwell], 0.0, 1 - _END)
+        return np.asarray(self.dwell + np.clip(self.elapsed / self.dwells[self.dwell], 0.0, 1 - _END))
 
     def changes(self, vehicle: Vehicle, time: float, length: float) -> Floats:
         """Compute the changes of the pose since the flip, (n, 3), of a vehicle with its units."""

@@ -1,8 +1,8 @@
 """A vehicle of any kind, whose dwells are alike: it tells the noise of a swim without a model of the robot.
 
-A swim has hundreds of dwells, and those of equal length in one direction are repeats of each other. So whatever the
-robot is, its motion in a dwell is a smooth function of the time since the flip, and of the dwell before. To the
-vehicle of the robot as given are added, for each direction, forward, to the left and in heading,
+A swim has hundreds of dwells, and those of equal length in one direction are repeats of each other. So whatever
+the robot is, its motion in a dwell is a smooth function of the time since the flip, and of the dwell before. To
+the vehicle of the robot as given are added, for each direction, forward, to the left and in heading,
 
     twist       a rate,
     lag         a constant, reached as tails turn over: 1 − exp(−t/0.3),

@@ -64,7 +64,8 @@ class PoseNoise:
 
     def of(self, rows: Flags) -> PoseNoise:
         """Take some poses (n,): all up to some time of each part."""
-        return replace(self, part=self.part[rows], time=self.time[rows], flips=self.flips[rows], moved=self.moved[rows])
+        changes = {name: getattr(self, name)[rows] for name in ("part", "time", "flips", "moved")}
+        return replace(self, **changes)
 
     @property
     def log_determinant(self) -> float:
@@ -89,107 +90,124 @@ class PoseNoise:
 
 
 @compiled
-def _gains(decay, flips, moved, white, slow, step):  # type: ignore[no-untyped-def]
+def _gains(
+    decay: Floats, flips: Floats, moved: Floats, white: Floats, slow: Floats, step: Floats
+) -> tuple[Floats, Floats]:
     """Run the covariance of the state along the poses, see `PoseNoise._filter`."""
     n = len(decay)
-    gains, roots = np.zeros((n, 6, 3)), np.zeros((n, 3, 3))
-    P, S, ahead = np.zeros((6, 6)), np.zeros((3, 3)), np.zeros((6, 3))
+    gains, roots, P = np.zeros((n, 6, 3)), np.zeros((n, 3, 3)), np.zeros((6, 6))
     for i in range(n):
         if decay[i] < 0:
-            for a in range(6):
-                for b in range(6):
-                    P[a, b] = 0.0
+            P[:] = 0.0
             for a in range(3):
                 P[3 + a, 3 + a] = slow[a]
         else:
-            for a in range(3):
-                P[a, a] += flips[i] * step[a]
-            for b in range(6):  # a turned robot goes on in another direction
-                P[0, b] -= moved[i, 1] * P[2, b]
-                P[1, b] += moved[i, 0] * P[2, b]
-            for a in range(6):
-                P[a, 0] -= moved[i, 1] * P[a, 2]
-                P[a, 1] += moved[i, 0] * P[a, 2]
-            for a in range(3):
-                for b in range(6):
-                    P[3 + a, b] *= decay[i]
-                for b in range(6):
-                    P[b, 3 + a] *= decay[i]
-                P[3 + a, 3 + a] += (1 - decay[i] ** 2) * slow[a]
-        for a in range(6):
-            for b in range(3):
-                ahead[a, b] = P[a, b] + P[a, 3 + b]
-        for a in range(3):
-            for b in range(3):
-                S[a, b] = ahead[a, b] + ahead[3 + a, b]
-            S[a, a] += white[a]
-        for a in range(3):  # Cholesky
-            for b in range(a + 1):
-                total = S[a, b]
-                for c in range(b):
-                    total -= roots[i, a, c] * roots[i, b, c]
-                roots[i, a, b] = math.sqrt(max(total, 1e-300)) if a == b else total / roots[i, b, b]
-        for a in range(6):  # ahead S⁻¹
-            for b in range(3):
-                total = ahead[a, b]
-                for c in range(b):
-                    total -= gains[i, a, c] * roots[i, b, c]
-                gains[i, a, b] = total / roots[i, b, b]
-            for b in range(2, -1, -1):
-                total = gains[i, a, b]
-                for c in range(b + 1, 3):
-                    total -= gains[i, a, c] * roots[i, c, b]
-                gains[i, a, b] = total / roots[i, b, b]
-        for a in range(6):
-            for b in range(6):
-                for c in range(3):
-                    P[a, b] -= gains[i, a, c] * ahead[b, c]
-        for a in range(6):
-            for b in range(a):
-                mean = (P[a, b] + P[b, a]) / 2
-                P[a, b] = mean
-                P[b, a] = mean
+            _advance(P, decay[i], flips[i], moved[i], slow, step)
+        _update(P, white, gains[i], roots[i])
     return gains, roots
 
 
 @compiled
-def _filtered(table, gains, roots, decay, moved, colour):  # type: ignore[no-untyped-def]
+def _advance(P: Floats, decay: float, flips: float, moved: Floats, slow: Floats, step: Floats) -> None:
+    """Take the covariance of the state to the next pose."""
+    for a in range(3):
+        P[a, a] += flips * step[a]
+    for b in range(6):  # a turned robot goes on in another direction
+        P[0, b] -= moved[1] * P[2, b]
+        P[1, b] += moved[0] * P[2, b]
+    for a in range(6):
+        P[a, 0] -= moved[1] * P[a, 2]
+        P[a, 1] += moved[0] * P[a, 2]
+        for b in range(3):
+            P[a, 3 + b] *= decay
+    for a in range(3):
+        for b in range(6):
+            P[3 + a, b] *= decay
+        P[3 + a, 3 + a] += (1 - decay**2) * slow[a]
+
+
+@compiled
+def _update(P: Floats, white: Floats, gain: Floats, root: Floats) -> None:
+    """Learn from a pose: the covariance of the state, the gain and the root of the innovation's covariance."""
+    ahead = np.zeros((6, 3))  # of the state and the pose
+    for a in range(6):
+        for b in range(3):
+            ahead[a, b] = P[a, b] + P[a, 3 + b]
+    for a in range(3):  # Cholesky factor of what is expected of the pose
+        for b in range(a + 1):
+            total = ahead[a, b] + ahead[3 + a, b] + (white[a] if a == b else 0.0)
+            for c in range(b):
+                total -= root[a, c] * root[b, c]
+            root[a, b] = math.sqrt(max(total, 1e-300)) if a == b else total / root[b, b]
+    for a in range(6):
+        for b in range(3):
+            for c in range(b):
+                ahead[a, b] -= ahead[a, c] * root[b, c]
+            ahead[a, b] /= root[b, b]
+    for a in range(6):
+        for b in range(6):
+            for c in range(3):
+                P[a, b] -= ahead[a, c] * ahead[b, c]
+    for a in range(6):
+        for b in range(2, -1, -1):
+            gain[a, b] = ahead[a, b]
+            for c in range(b + 1, 3):
+                gain[a, b] -= gain[a, c] * root[c, b]
+            gain[a, b] /= root[b, b]
+
+
+@compiled
+def _filtered(table: Floats, gains: Floats, roots: Floats, decay: Floats, moved: Floats, colour: bool) -> Floats:
     """Turn poses (n, 3, m) into innovations over their standard deviations, or back."""
     n, _, m = table.shape
-    result, state, e = np.empty((n, 3, m)), np.zeros((6, m)), np.zeros((3, m))
+    result, state, new = np.empty((n, 3, m)), np.zeros((6, m)), np.zeros((3, m))
     for i in range(n):
         if decay[i] < 0:
-            for a in range(6):
-                for j in range(m):
-                    state[a, j] = 0.0
+            state[:] = 0.0
         else:
-            for j in range(m):
-                state[0, j] -= moved[i, 1] * state[2, j]
-                state[1, j] += moved[i, 0] * state[2, j]
-            for a in range(3, 6):
-                for j in range(m):
-                    state[a, j] *= decay[i]
+            _predict(state, decay[i], moved[i])
         if colour:
-            for a in range(3):
-                for j in range(m):
-                    total = 0.0
-                    for c in range(a + 1):
-                        total += roots[i, a, c] * table[i, c, j]
-                    e[a, j] = total
-                    result[i, a, j] = total + state[a, j] + state[3 + a, j]
+            _coloured(table[i], roots[i], state, new, result[i])
         else:
-            for a in range(3):
-                for j in range(m):
-                    e[a, j] = table[i, a, j] - state[a, j] - state[3 + a, j]
-                    total = e[a, j]
-                    for c in range(a):
-                        total -= roots[i, a, c] * result[i, c, j]
-                    result[i, a, j] = total / roots[i, a, a]
+            _whitened(table[i], roots[i], state, new, result[i])
         for a in range(6):
             for c in range(3):
                 for j in range(m):
-                    state[a, j] += gains[i, a, c] * e[c, j]
+                    state[a, j] += gains[i, a, c] * new[c, j]
     return result
+
+
+@compiled
+def _predict(state: Floats, decay: float, moved: Floats) -> None:
+    """Take the state to the next pose."""
+    for j in range(state.shape[1]):
+        state[0, j] -= moved[1] * state[2, j]
+        state[1, j] += moved[0] * state[2, j]
+        for a in range(3, 6):
+            state[a, j] *= decay
+
+
+@compiled
+def _whitened(pose: Floats, root: Floats, state: Floats, new: Floats, result: Floats) -> None:
+    """Compute innovations (3, m), and solve for white numbers."""
+    for a in range(3):
+        for j in range(pose.shape[1]):
+            new[a, j] = pose[a, j] - state[a, j] - state[3 + a, j]
+            result[a, j] = new[a, j]
+            for c in range(a):
+                result[a, j] -= root[a, c] * result[c, j]
+            result[a, j] /= root[a, a]
+
+
+@compiled
+def _coloured(white: Floats, root: Floats, state: Floats, new: Floats, result: Floats) -> None:
+    """Compute innovations (3, m) of white numbers, and the pose."""
+    for a in range(3):
+        for j in range(white.shape[1]):
+            new[a, j] = 0.0
+            for c in range(a + 1):
+                new[a, j] += root[a, c] * white[c, j]
+            result[a, j] = new[a, j] + state[a, j] + state[3 + a, j]
 
 
 def estimate_noise(rough: PoseNoise, residual: Floats, columns: Floats) -> PoseNoise:

@@ -21,7 +21,6 @@ import numpy as np
 
 from calibration.statistics.statistical_model import Parameter, Parameters
 from calibration.swim.course import Base, Moments, course
-from calibration.swim.measured_swim import MeasuredSwim
 from calibration.swim.swim_runs import SwimRuns, first_of_last
 from calibration.swimmer.influences import CAMERA, CURRENT, HEADING
 from common.arrays import Floats
@@ -58,15 +57,13 @@ class Sight:
         """Marker and clock."""
         length, far = self.runs.length, _FARTHEST * self.runs.length
         known = all(swim.clock_known for swim in self.runs.swims)
-        markers = ((AHEAD, "ahead"), (LEFT, "left"))
+        metre: dict[str, Any] = {"unit": "cm", "shown": 100.0, "sigma": _BESIDE * length}
+        title = "marker {} the head's centre"
         return (
-            *(
-                Parameter(name, f"marker {side} of the head's centre", 0.0, (-far, far), 1e-3, unit="cm", shown=100.0,
-                          sigma=_BESIDE * length)
-                for name, side in markers
-            ),
+            Parameter(AHEAD, title.format("ahead of"), 0.0, (-far, far), 1e-3, **metre),
+            Parameter(LEFT, title.format("left of"), 0.0, (-far, far), 1e-3, **metre),
             Parameter(CLOCK, "motor later than the poses", 0.0, (-5.0, 5.0), 0.05, unit="s", sigma=_LATE[known]),
-        )  # fmt: skip
+        )
 
     def without(self, parameters: Parameters) -> dict[str, Any]:
         """Return the parameters of the vehicle alone."""
@@ -91,12 +88,9 @@ class Sight:
         angle: dict[str, Any] = {"typical": 0.01, "unit": "°", "shown": 180 / math.pi}
         for number, column, of in zip(STARTS, swim.poses.T, (metre, metre, angle), strict=True):
             value, room = float(np.interp(at, swim.time, column)), 5 * (self.runs.length if of is metre else 1.0)
-            starts.append(
-                Parameter(
-                    f"{number}: {name}", f"{number.replace('_', ' ')}, {name}", value, (value - room, value + room),
-                    of_these_runs=True, of_group=(number, name), **of,
-                )
-            )  # fmt: skip
+            title, ends = f"{number.replace('_', ' ')}, {name}", (value - room, value + room)
+            own: dict[str, Any] = {"of_these_runs": True, "of_group": (number, name)}
+            starts.append(Parameter(f"{number}: {name}", title, value, ends, **own, **of))
         return starts
 
     def _seen(self, at: Parameters, vehicle: Vehicle, time: float, length: float) -> Floats:

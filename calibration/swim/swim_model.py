@@ -1,8 +1,8 @@
 """A robot and its swims as a model for the calibration: what was seen of a path tells what the model lacks.
 
-The numbers and effects of the robot are those of `calibration.swimmer`, the poses those of `calibration.swim.sight`.
-The base of the courses is a robot as first fitted. The noise is that of `calibration.swim.free_vehicle`, which knows
-no robot.
+The numbers and effects of the robot are those of `calibration.swimmer`, the poses those of
+`calibration.swim.sight`. The base of the courses is the robot as first fitted. The noise is that of
+`calibration.swim.free_vehicle`, which knows no robot.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -28,6 +27,7 @@ from calibration.swimmer.influences import HEADING, TRACKED_POINT
 from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from common.arrays import Flags, Floats
+from common.errors import InputError
 from planner.vehicle.vehicle import Vehicle
 from sim.model.robot import Robot
 
@@ -41,7 +41,7 @@ class SwimModel:
     robot: SwimmerModel  # at constant motor, in both directions
     sight: Sight
     runs: SwimRuns  # those of the sight
-    near: Near = Near({})  # the base
+    near: Near = field(default_factory=lambda: Near({}))  # the base
     began: Mapping[str, float] = field(default_factory=dict)  # its parameters
 
     @property
@@ -69,8 +69,8 @@ class SwimModel:
         return {**start, **self.began}
 
     def possible(self) -> tuple[ForwardModel, list[dict[str, Any]]]:
-        """Return no runs: a swim is planned."""
-        raise NotImplementedError
+        """Refuse: a swim is planned."""
+        raise InputError("no settings make a swim; plan a path")
 
     def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
         """Predict (P, n, 3), see `ForwardModel`."""
@@ -106,8 +106,8 @@ class SwimModel:
         for name, size in sizes.items():
             null = next(effect.start for effect in self.effects if effect.name == name)
             others = self._bases({**self.began, name: size})
-            bases = (base.with_slope(name, size - null, other) for base, other in zip(sight.bases, others, strict=True))
-            sight = replace(sight, bases=tuple(bases))
+            pairs = zip(sight.bases, others, strict=True)
+            sight = replace(sight, bases=tuple(base.with_slope(name, size - null, other) for base, other in pairs))
         return replace(self, sight=sight)
 
     def _bases(self, at: Parameters) -> tuple[Base, ...]:

@@ -66,6 +66,10 @@ class SwimRuns(Runs):
         return np.zeros(len(self))
 
     @property
+    def plane(self) -> tuple[str, str]:
+        return "x", "y"
+
+    @property
     def parts(self) -> tuple[Integers, tuple[str, ...]]:
         return self.part, self.part_names
 
@@ -138,7 +142,7 @@ def runs_of_swims(swims: Sequence[MeasuredSwim], length: float) -> tuple[SwimRun
 
 def first_of_last(swim: MeasuredSwim) -> int:
     """Return the dwell with which the last part of a swim begins."""
-    return int(round((1 - _HELD_OUT) * (len(swim.flips) - 1)))
+    return round((1 - _HELD_OUT) * (len(swim.flips) - 1))
 
 
 def _direction(swim: MeasuredSwim) -> Any:

@@ -97,6 +97,11 @@ class Runs:
         return table if self.memory is None else self.memory.whiten(table)
 
     @property
+    def plane(self) -> tuple[str, str] | None:
+        """Outputs that are a place in a plane, which runs follow one another along; None: no such."""
+        return None
+
+    @property
     def parts(self) -> tuple[Integers, tuple[str, ...]] | None:
         """Number and name what is held out, (n,), where it is neither sessions nor blocks of them."""
         return None

@@ -1,8 +1,11 @@
-"""Calibrate a robot with its swims: once with what the vehicle leaves out of no effect, and again where that shows."""
+"""Calibrate a robot with its swims.
+
+Once with an effect's motion as the vehicle has it, and again, where it shows, with what the vehicle leaves out.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -20,15 +23,23 @@ _SHOWS = 1.0  # standard deviations by which it moves all poses together
 
 
 def calibrate_swims(
-    robot: Robot, swims: Sequence[MeasuredSwim], *, jobs: int | None, progress: bool, **settings: Any
+    robot: Robot,
+    swims: Sequence[MeasuredSwim],
+    *,
+    verdict: Callable[..., V],
+    jobs: int | None,
+    progress: bool,
+    **settings: Any,
 ) -> V:
     """Calibrate a robot with its swims; the settings are those of `calibration.verdict.calibrate.calibrate`."""
     model, held_out = swim_model(robot, swims, jobs=jobs, progress=progress)
-    result = calibrate(model, held_out=held_out, progress=progress, **settings)
+    settings |= {"held_out": held_out, "progress": progress, "verdict": verdict}
+    result: V = calibrate(model, **settings)
     learnt = model.learnt(_sizes(model, result))
     if float(np.linalg.norm(_moved(model, learnt, result))) < _SHOWS:
         return result
-    return calibrate(learnt, held_out=held_out, progress=progress, **settings)
+    again: V = calibrate(learnt, **settings)
+    return again
 
 
 def _sizes(model: SwimModel, result: Verdict) -> dict[str, float]:
