@@ -1,0 +1,144 @@
+"""The poses of a swim are those of the simulator, their noise needs no model, and a swim tells what is missing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import softflagella as sf
+from calibration.robot.robot_verdict import RobotVerdict
+from calibration.statistics.forward import derivatives
+from calibration.statistics.statistical_model import start_values
+from calibration.swim.free_vehicle import with_noise
+from calibration.swim.measured_swim import MeasuredSwim, read_swims
+from calibration.swim.pose_noise import Sizes
+from calibration.swim.swim_model import SwimModel, swim_model
+from common.arrays import Floats
+from common.errors import InputError
+from planner.planning.plan import Plan
+from sim.model.robot import Robot
+from tests.oracles.swims import CameraNoise, make_track, swum
+from tests.planner.plans import CONTROL
+
+THREE = replace(CONTROL, tails=3)
+KICK = (1e-4, 0.003)
+
+
+def plan_of(robot: Robot) -> Plan:
+    return sf.plan(sf.polygon(4, side=2.0), robot)
+
+
+def changed(robot: Robot, **effects: float) -> Robot:
+    return replace(robot, C_t=1.1 * robot.C_t, C_r=0.9 * robot.C_r, effects=effects)
+
+
+def exact_swim(truth: Robot, plan: Plan) -> MeasuredSwim:
+    """Return a swim whose poses are those of the simulator."""
+    (seen,) = read_swims(make_track(truth, plan, seed=0), plan)
+    return replace(seen, poses=swum(truth, plan, None).at(seen.time))
+
+
+def plain_model(robot: Robot, swim: MeasuredSwim) -> SwimModel:
+    """Return a model of a swim without noise, with poses as they are."""
+    model, _ = swim_model(robot, [swim])
+    runs = model.runs.in_noise(Sizes(np.ones(2), np.full(2, 1e-9), np.full(2, 1e-9), 1.0), model.runs.poses)
+    return replace(model, runs=runs, sight=replace(model.sight, runs=runs))
+
+
+def farthest(model: SwimModel, at: dict[str, float]) -> Floats:
+    """Compute how far poses are from the model, at the best start, at most: mm, mm, degrees."""
+    off = model.runs.y - model.predict([at])[0]
+    starts = derivatives(model, at, model.sight.coefficients)[1].reshape(off.size, -1)
+    off -= (starts @ np.linalg.lstsq(starts, off.ravel(), rcond=None)[0]).reshape(off.shape)
+    return np.abs(off).max(0) * [1e3 * model.runs.length, 1e3 * model.runs.length, 180 / np.pi]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("robot", "effects"), [(CONTROL, {}), (CONTROL, {"left_right_bias": 0.1}), (THREE, {"disc_drag": 0.2})]
+)
+def test_poses_are_those_of_the_simulator(robot: Robot, effects: dict[str, float]) -> None:
+    """With the base at the robot as given and coefficients off by 10 % within 0.8 mm of a path of 8 l."""
+    truth, plan = changed(robot, **effects), plan_of(robot)
+    model = plain_model(robot, exact_swim(truth, plan))
+    at = {**start_values(model), "C_t": truth.C_t, "C_r": truth.C_r, **effects}
+    given = model.based(start_values(model))
+    assert (farthest(given, at) < [0.8, 0.8, 0.3]).all()
+    assert (farthest(given.based(at), at) < [0.05, 0.05, 0.05]).all()
+    assert farthest(given, start_values(model)).max() > 2  # the change is large
+
+
+@pytest.mark.slow
+def test_the_noise_needs_no_model() -> None:
+    """A hidden effect does not hide in it."""
+    plan, found = plan_of(CONTROL), []
+    for effects in ({}, {"left_right_bias": 0.3}):
+        track = make_track(changed(CONTROL, **effects), plan, seed=1, kick=KICK)
+        model, held_out = swim_model(CONTROL, read_swims(track, plan))
+        plain = replace(model.sight, runs=replace(model.runs, noise_of_poses=None, y=model.runs.poses))
+        ((vehicle, time, length),) = model.vehicles([start_values(model)])
+        runs, _ = with_noise(plain, vehicle, time, length, ~held_out)
+        assert runs.noise_of_poses is not None
+        found.append(np.concatenate(runs.noise_of_poses.sizes[:3]) * np.tile([model.runs.length, 1.0], 3))
+    camera = CameraNoise()
+    truth = [*camera.white, *camera.slow, *KICK]
+    assert (np.abs(np.log(np.array(found) / truth)) < 0.5).all()
+    assert (np.abs(np.log(found[0] / found[1])) < 0.2).all()
+
+
+@cache
+def verdict_of(bias: float) -> RobotVerdict:
+    plan = plan_of(CONTROL)
+    truth = changed(CONTROL, **({"left_right_bias": bias} if bias else {}))
+    track = make_track(truth, plan, seed=2, kick=KICK, marker=(0.002, -0.001, 0.02), current=(2e-5, 0.0), scale=1.01)
+    verdict = sf.calibrate(track, CONTROL, plan=plan, progress=False)
+    assert isinstance(verdict, RobotVerdict)
+    return verdict
+
+
+@pytest.mark.rest
+def test_a_swim_tells_what_is_missing() -> None:
+    verdict, truth = verdict_of(0.1), changed(CONTROL)
+    assert verdict.verdict == "effect"
+    assert verdict.effects == ("left_right_bias",)
+    low, high = verdict.final_intervals["left_right_bias"]
+    assert low < 0.1 < high
+    for name in ("C_t", "C_r", "C_yr"):
+        low, high = verdict.final_intervals[name]
+        assert low < getattr(truth, name) < high
+    assert verdict.errors.rms["after"] < verdict.errors.rms["before"] / 2
+    assert verdict.corrected.effects["left_right_bias"] == pytest.approx(0.1, rel=0.25)
+    assert verdict.knowledge.current[0] == pytest.approx(2e-5, abs=3 * verdict.knowledge.current_error[0])
+
+
+@pytest.mark.rest
+def test_of_a_robot_that_lacks_nothing_nothing_is_claimed() -> None:
+    verdict = verdict_of(0.0)
+    assert verdict.verdict == "none"
+    assert verdict.split.names == "last third of swim"
+    assert "cm" in verdict.errors_in_words
+
+
+@pytest.mark.rest
+def test_the_corrected_robot_swims_the_path() -> None:
+    """Planned with the verdict, the true robot is nearer to the path than planned with the robot as given."""
+    truth, path = changed(CONTROL, left_right_bias=0.1), plan_of(CONTROL)
+    again = sf.plan(sf.polygon(4, side=2.0), verdict_of(0.1))
+    before, after = (sf.check(plan, sf.replay(plan.schedule(truth))).raw_rms for plan in (path, again))
+    assert after < before / 3
+
+
+@pytest.mark.rest
+def test_a_swim_is_reported_with_its_track(tmp_path: object) -> None:
+    verdict = verdict_of(0.1)
+    _, report, corrected = verdict.save(str(tmp_path))
+    assert "track in the plane" in report.read_text()
+    assert "left_right_bias" in corrected.read_text()
+
+
+def test_a_plan_is_for_a_track() -> None:
+    with pytest.raises(InputError, match="plan is not for a model of your own"):
+        sf.calibrate("falls.csv", sf.Model(lambda c, p: {}, {}, []), plan="plan.json")
