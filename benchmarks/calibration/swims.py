@@ -102,7 +102,7 @@ def said(case: str, seed: int) -> dict[str, Any]:
         record |= {"term": term, "size": truth.effects.get(term), "tails": truth.tails,
                    "dwells": len(swim.plan.dwells), "as_given": error(truth, swim.plan, swim)}  # fmt: skip
         began = time.process_time()
-        verdict: Any = sf.calibrate(track, swim.given, seed=seed, jobs=1, progress=False)
+        verdict: Any = sf.calibrate(track, swim.given, plan=swim.plan, seed=seed, jobs=1, progress=False)
         record |= {"seconds": time.process_time() - began} | answers(verdict, swim.truth, term)
         known = CalibrationKnowledge(current=swim.disturbed["current"])
         again = error(truth, sf.plan(swim.path, verdict, unit="m"), swim)
