@@ -88,7 +88,7 @@ def test_outliers_are_dropped_and_flips_are_none() -> None:
     assert "poses are turned by half a turn (the first at " in swum.said[1]
 
 
-@pytest.mark.parametrize("every", [0.05, 0.4, 1.2])
+@pytest.mark.parametrize("every", [0.05, 0.4, 1.2, 2.4])
 @pytest.mark.parametrize("seed", range(5))
 def test_no_pose_of_a_good_track_is_dropped(every: float, seed: int) -> None:
     for noise in (0.0, 1.0, 3.0):
@@ -254,6 +254,16 @@ def test_tracks_of_the_simulator_have_exact_flips(tmp_path: Path) -> None:
     swum = read(led.to_frame(), json.loads(json_file.read_text()))
     assert swum.dwells == pytest.approx(led.dwells * plan.robot.time_scale)
     assert "a tracker led the robot" in swum.said[0]
+
+
+def test_answers_on_a_pipe_turn_the_motor_in_their_rows() -> None:
+    """Poses beside answers: a line at each flip has no pose."""
+    at_flips = pd.DataFrame({"time_s": FLIPS, "direction": [*(-1, 1) * 30, 0]})
+    table = pd.concat([track(), at_flips]).sort_values("time_s", kind="stable").assign(flip_at_s=1.0)
+    swum = read(table)
+    assert_true(swum)
+    assert swum.flips == pytest.approx(FLIPS)
+    assert swum.flip_error == 0.0
 
 
 def test_tracks_of_other_programs_need_the_plan(tmp_path: Path) -> None:
