@@ -1,7 +1,8 @@
 """When the motor of a swim was reversed: as a column of a track tells, or as planned.
 
 A flip lies between the last row of one direction and the first row of the next: half-way, with the standard
-deviation of a uniform distribution. In a track of the simulator, the last row of a dwell is its end.
+deviation of a uniform distribution. In a track of the simulator, the last row of a dwell is its end. Beside the
+answers of a tracker on a pipe, which turn the motor, it flips in the first row.
 
 The clock of a plan begins with its motor, that of a camera at any time. The robot turns to the left while the
 direction is positive, so the start of the plan is where the turns of the heading fit the directions best: where
@@ -59,13 +60,13 @@ class Motor(NamedTuple):
         return self._replace(first_direction=sense, flips=self.flips[begin : end + 1])
 
 
-def motor_by_rows(time: Floats, direction: Floats, *, exact: bool) -> tuple[Motor, list[str]]:
+def motor_by_rows(time: Floats, direction: Floats, share: float) -> tuple[Motor, list[str]]:
     """Find the flips in the rows of a track, and say where the motor rests meanwhile.
 
     Args:
         time: (m,), not decreasing [s].
         direction: of the motor (m,): 1, −1, or 0 where it rests.
-        exact: the last row of a dwell is its end.
+        share: of the time from one row to the next after which it flips: 0, 1, or 0.5 if it is not known.
 
     Raises:
         InputError: the motor never turns, or two flips have one time.
@@ -77,20 +78,20 @@ def motor_by_rows(time: Floats, direction: Floats, *, exact: bool) -> tuple[Moto
     first, end = parts[np.argmax(time[parts[:, 1] - 1] - time[parts[:, 0]])]
     last = first + np.flatnonzero(np.diff(direction[first:end]))  # rows of a dwell, but of the last dwell
     before, after = time[last], time[last + 1]
-    begin = time[first] if exact or first == 0 else time[first - 1 : first + 1].mean()
-    over = time[end - 1] if exact else time[end - 1 : end + 1].mean()
-    flips = np.array([begin, *(before if exact else (before + after) / 2), over])
+    rows = time[max(first - 1, 0) : first + 1], time[end - 1 : end + 1]
+    begin, over = ((1 - share) * each[0] + share * each[-1] for each in rows)
+    flips = np.array([begin, *((1 - share) * before + share * after), over])
     if (np.diff(flips) <= 0).any():
         again = flips[1:][np.diff(flips) <= 0][0]
         raise InputError(f"direction changes twice at {again:g} s; give the time of each change")
-    error = 0.0 if exact or not len(before) else float(np.median(after - before)) / math.sqrt(12)
-    rows = time[first:first] if exact else time[first:end]
-    gaps = np.flatnonzero(np.diff(rows) > np.diff(flips).min())
+    known = share in (0, 1) or not len(before)
+    error = 0.0 if known else float(np.median(after - before)) / math.sqrt(12)
+    gaps = first + np.flatnonzero((np.diff(time[first:end]) > np.diff(flips).min()) & (not known))
     said = []
     if len(parts) > 1:
         part = f"{format_time(begin)} to {format_time(over)}"
         said.append(f"the motor rests in between; kept is the longest part, {part}")
-    return Motor(int(direction[first]), flips, error, unseen=np.stack([rows[gaps], rows[gaps + 1]], 1)), said
+    return Motor(int(direction[first]), flips, error, unseen=np.stack([time[gaps], time[gaps + 1]], 1)), said
 
 
 def planned_motor(plan: Mapping[str, Any], span: float = 0.0) -> Motor:

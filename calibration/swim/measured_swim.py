@@ -35,6 +35,7 @@ PlanSource = str | Path | Mapping[str, Any] | Plan  # plan.json, its content, or
 _FEWEST_DWELLS, _FEWEST_POSES = 12, 60
 _LARGEST = 1e9  # of a value
 _SIMULATED = {"dwell", "time_bar"}  # columns of a track of the simulator
+_ANSWERED = "flip_at_s"  # a column of poses beside the answers of a tracker on a pipe
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ def read_swims(
         require_lab(table)
         if content is not None:
             check_plan_id(content, table)
-        exact = set(read) >= _SIMULATED
+        share = 0.0 if set(read) >= _SIMULATED else 1.0 if _ANSWERED in read else 0.5
         values = _values(table, [*LAB, *(name for name in ("direction",) if name in table)])
         name = "swim" if isinstance(source, pd.DataFrame) else Path(source).stem
         runs = run_names(table["run"]) if "run" in table else pd.Series(name, table.index)
@@ -91,7 +92,7 @@ def read_swims(
                 at = row_name(table, int(back))
                 raise InputError(f"the time of {run} goes back at {at}; give a row for each time, in order")
             with naming(run if len(names) > 1 else None):
-                swims.append(_swim(run, values[rows], content, exact=exact, lost=lost))
+                swims.append(_swim(run, values[rows], content, share, lost))
             lost = ()
     return swims
 
@@ -128,9 +129,9 @@ def _values(table: pd.DataFrame, names: list[str]) -> Floats:
 
 
 def _swim(
-    name: str, values: Floats, plan: Mapping[str, Any] | None, *, exact: bool, lost: tuple[str, ...]
+    name: str, values: Floats, plan: Mapping[str, Any] | None, share: float, lost: tuple[str, ...]
 ) -> MeasuredSwim:
-    """Make a swim of the rows of a run (m, 4 or 5): LAB, and direction if there is one."""
+    """Make a swim of the rows of a run (m, 4 or 5), LAB and perhaps direction; for `share` see `motor_by_rows`."""
     seen = values[np.isfinite(values).all(1)]
     seen = seen[np.diff(seen[:, 0], prepend=-math.inf) > 0]
     time, poses = seen[:, 0], seen[:, 1:4] * [0.01, 0.01, math.pi / 180]
@@ -138,7 +139,7 @@ def _swim(
     said = [*lost, *([f"{missing} of {len(values)} rows have no pose"] if missing else [])]
     _refuse_few(len(time), _FEWEST_POSES, "poses")
     if values.shape[1] > len(LAB):
-        motor, notes = motor_by_rows(values[:, 0], values[:, 4], exact=exact)
+        motor, notes = motor_by_rows(values[:, 0], values[:, 4], share)
         said += notes
         _refuse_few(len(motor.flips) - 1, _FEWEST_DWELLS, "dwells between flips of the motor")
         motor, notes = as_planned(motor, plan) if plan is not None else (motor, [])
@@ -150,7 +151,7 @@ def _swim(
     turning = (time >= motor.flips[0]) & (time <= motor.flips[-1])
     time, poses = time[turning], poses[turning]
     _refuse_few(len(time), _FEWEST_POSES, "poses while the motor turns")
-    if not exact:
+    if share:  # the simulator looks at a robot when it likes
         new, notes = seen_poses(time, poses, share=0.0)
         time, poses = time[new], poses[new]
         said += notes

@@ -21,7 +21,7 @@ from common.arrays import Complex, Flags, Floats
 from common.errors import InputError
 from common.units import format_time
 
-_FAR = 15.0  # median distances from the lines; noise keeps within 7, and within 10 where a dwell has four poses
+_FAR = 12.0  # usual distances from the lines; noise and the robot's lag keep within 7
 _MOST = 0.1  # share of outliers
 _ROUNDS = 10
 _JUMP = 4.0  # median turns
@@ -37,10 +37,11 @@ def outliers(time: Floats, poses: Floats, motor: Motor) -> Flags:
     dwells = np.diff(motor.flips)
     pieces = np.maximum(np.rint(dwells / np.median(dwells)), 1).astype(int)
     knots = np.interp(np.arange(pieces.sum() + 1), np.append(0, np.cumsum(pieces)), motor.flips)
-    far = np.zeros(len(time), bool)
+    # The lines go through as many poses as there are knots: the usual distance is the median of the others.
+    usual, far = min((1 + len(knots) / len(time)) / 2, 1 - _MOST), np.zeros(len(time), bool)
     for values in (poses[:, 0] + 1j * poses[:, 1], np.exp(2j * poses[:, 2])):
         distance = _distances(time, values, knots)
-        far |= distance > _FAR * np.median(distance)
+        far |= distance > _FAR * np.quantile(distance, usual)
     if far.mean() > _MOST:
         raise InputError(
             f"{far.sum()} of {len(far)} poses jump away from the others (the first at {time[far][0]:g} s), or the "

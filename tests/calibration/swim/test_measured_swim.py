@@ -28,9 +28,9 @@ def read(table: pd.DataFrame | str | Path, plan: Any = None) -> MeasuredSwim:
     return swum
 
 
-def assert_true(swum: MeasuredSwim, *, clock: float = 0.0, sigmas: float = 7.0, whole: float = 0.0) -> None:
+def assert_true(swum: MeasuredSwim, *, clock: float = 0.0, sigmas: float = 7.0, flips: np.ndarray = FLIPS) -> None:
     """Its poses are those of the robot, with the right number of turns but for whole ones of all."""
-    off = swum.poses - poses_at(swum.time - clock)
+    off = swum.poses - poses_at(swum.time - clock, flips)
     off[:, 2] -= 2 * np.pi * np.rint(off[0, 2] / (2 * np.pi))
     assert np.abs(off / [3e-4, 3e-4, np.radians(0.5)]).max() < sigmas
 
@@ -88,7 +88,7 @@ def test_outliers_are_dropped_and_flips_are_none() -> None:
     assert "poses are turned by half a turn (the first at " in swum.said[1]
 
 
-@pytest.mark.parametrize("every", [0.05, 0.4, 1.2])
+@pytest.mark.parametrize("every", [0.05, 0.4, 1.2, 2.4])
 @pytest.mark.parametrize("seed", range(5))
 def test_no_pose_of_a_good_track_is_dropped(every: float, seed: int) -> None:
     for noise in (0.0, 1.0, 3.0):
@@ -128,6 +128,7 @@ def test_flips_in_a_time_without_rows_are_not_invented() -> None:
         swum = read(table[~gap])
         assert_true(swum)
         assert swum.time[0] > FLIPS[last]
+        assert swum.flips[1] <= swum.time[0]  # its memory of the dwell before is short
         assert swum.flips[-37:] == pytest.approx(FLIPS[-37:], abs=0.4)
         assert "in 1 gaps" in swum.said[-1]
         assert swum.first_direction == (-1) ** (len(swum.dwells) - len(DWELLS) + 1)
@@ -136,12 +137,16 @@ def test_flips_in_a_time_without_rows_are_not_invented() -> None:
 
 
 def test_a_plan_beside_directions_counts_where_it_was_carried_out() -> None:
-    table = track()
+    table = track(rest=5.1)
     gap = table["time_s"].between(FLIPS[20] - 1, FLIPS[22] + 1)
     swum = read(table[~gap], PLAN)
     assert_true(swum)
-    assert np.abs(swum.flips - FLIPS).max() < 0.1
-    assert swum.flip_error < 0.05
+    assert np.abs(swum.flips - FLIPS).max() < 0.05
+    assert swum.flip_error < 0.02
+    early = track(flips=np.append(FLIPS[:40], FLIPS[39] + 1.9), rest=4.0)  # it was stopped
+    assert read(early, PLAN).flips[-1] == pytest.approx(FLIPS[39] + 1.9, abs=0.4)
+    assert read(early, PLAN).flips[:-1] == pytest.approx(FLIPS[:40], abs=0.05)
+    assert len(read(track(flips=FLIPS[:41], rest=4.0), PLAN).dwells) == 40
     assert swum.clock_known
     led = {**PLAN, "dwell_s": [1.03 * dwell for dwell in PLAN["dwell_s"]]}
     other = read(table, led)
@@ -163,6 +168,23 @@ def test_the_start_of_a_plan_is_found_in_the_headings(clock: float) -> None:
     assert_true(part, clock=clock)
     nearest = np.abs(np.subtract.outer(part.flips, FLIPS + clock)).min(1)
     assert nearest.max() < 0.3
+
+
+def test_laps_of_a_plan_go_on_as_long_as_the_track() -> None:
+    flips = np.append(0.0, np.cumsum(np.tile(DWELLS[:20], 3)))
+    lap = {**PLAN, "dwell_s": DWELLS[:20].tolist(), "lap": {}}
+    for table in (track(flips=flips), track(flips=flips).drop(columns="direction")):
+        swum = read(table, lap)
+        assert_true(swum, flips=flips)
+        assert swum.flips == pytest.approx(flips, abs=0.3)
+
+
+def test_a_long_dwell_that_turns_far_has_no_outliers() -> None:
+    flips = np.append(0.0, np.cumsum([*DWELLS[:30], 50.0, *DWELLS[30:]]))
+    table = track(flips=flips)
+    swum = read(table)
+    assert_true(swum, flips=flips)
+    assert (len(swum.time), swum.said) == (len(table), ())
 
 
 def test_another_plan_is_refused() -> None:
@@ -218,6 +240,9 @@ def test_bad_tables_are_refused_in_one_line(tmp_path: Path) -> None:
     )
     assert refusal(good.assign(direction=0)).startswith("the motor rests all the time")
     assert "other side than its motor" in refusal(good.assign(direction=-good["direction"]))
+    twice = good.assign(direction=good["direction"].where(good.index != 7, -good["direction"]))
+    twice.loc[6:8, "time_s"] = good["time_s"][6]
+    assert "changes twice at" in refusal(twice)
     noisy = track()
     noisy.loc[::6, "x_cm"] += 3.0
     assert "poses jump away from the others" in refusal(noisy)
@@ -256,6 +281,16 @@ def test_tracks_of_the_simulator_have_exact_flips(tmp_path: Path) -> None:
     assert "a tracker led the robot" in swum.said[0]
 
 
+def test_answers_on_a_pipe_turn_the_motor_in_their_rows() -> None:
+    """Poses beside answers: a line at each flip has no pose."""
+    at_flips = pd.DataFrame({"time_s": FLIPS, "direction": [*(-1, 1) * 30, 0]})
+    table = pd.concat([track(), at_flips]).sort_values("time_s", kind="stable").assign(flip_at_s=1.0)
+    swum = read(table)
+    assert_true(swum)
+    assert swum.flips == pytest.approx(FLIPS)
+    assert swum.flip_error == 0.0
+
+
 def test_tracks_of_other_programs_need_the_plan(tmp_path: Path) -> None:
     """A TUM trajectory: seconds, metres and a quaternion."""
     table = track()
@@ -265,6 +300,9 @@ def test_tracks_of_other_programs_need_the_plan(tmp_path: Path) -> None:
     np.savetxt(tmp_path / "track.tum", np.stack(columns, 1))
     assert is_track(tmp_path / "track.tum")
     assert_true(read(tmp_path / "track.tum", PLAN))
+    both = pd.concat([table.assign(run=1), table.assign(run=2)])
+    both.attrs["lost"] = ["2 poses are lost"]
+    assert [each.said for each in read_swims(both)] == [("2 poses are lost",), ()]
 
 
 def test_a_track_is_told_from_a_table_of_runs() -> None:
