@@ -13,13 +13,15 @@ all poses, in linear time. With q = 0 poses are compared as they are, with large
 are. Each part of a swim starts from a pose that is fitted.
 
 The variances have the largest restricted likelihood of what the richest model leaves, with all of its columns
-projected out (Patterson and Thompson 1971). What no effect can describe is noise then, mostly of the steps.
+projected out (Patterson and Thompson 1971); steps are at their mean. What the model cannot describe is noise then,
+mostly of the steps.
 Source of the filter: e.g. Anderson and Moore (1979), chapter 5.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -32,6 +34,7 @@ from sim.jit import compiled
 
 _LEAST, _MOST = 1e-4, 1e3  # of standard deviations, over the scatter of neighbouring poses
 _RIDGE = 1e-9  # of the products of columns, each of length 1
+_WIDE, _SIZES = 3.0, 25  # of the logarithm of a step on either side, and values there
 _STARTS = ((1.0, 1.0, 0.1), (1.0, 0.1, 1.0))  # white, slow, steps, over the scatter of neighbouring poses
 
 
@@ -251,4 +254,19 @@ def estimate_noise(rough: PoseNoise, residual: Floats, columns: Floats) -> PoseN
         )
         for start in _STARTS
     ]
-    return noise(min(searches, key=lambda search: search.fun).x)
+    return noise(_mean_steps(cost, min(searches, key=lambda search: search.fun).x))
+
+
+def _mean_steps(cost: Callable[[Floats], float], best: Floats) -> Floats:
+    """Replace the likeliest size of each step by its mean, with all sizes as likely before (Gelman 2006).
+
+    A few dwells hardly tell small steps from none, and steps that are too small make a path look too certain.
+    """
+    changed, around = best.copy(), np.linspace(-_WIDE, _WIDE, _SIZES)
+    for place in (4, 5):
+        tried = np.tile(best, (_SIZES, 1))
+        tried[:, place] += around
+        costs = np.array([cost(at) for at in tried])
+        weights = np.exp(costs.min() - costs + around)
+        changed[place] += math.log((weights * np.exp(2 * around)).sum() / weights.sum()) / 2
+    return changed

@@ -27,8 +27,8 @@ THREE = replace(CONTROL, tails=3)
 KICK = (1e-4, 0.003)
 
 
-def plan_of(robot: Robot) -> Plan:
-    return sf.plan(sf.polygon(4, side=2.0), robot)
+def plan_of(robot: Robot, side: float = 2.0) -> Plan:
+    return sf.plan(sf.polygon(4, side=side), robot)
 
 
 def changed(robot: Robot, **effects: float) -> Robot:
@@ -49,9 +49,10 @@ def plain_model(robot: Robot, swim: MeasuredSwim) -> SwimModel:
 
 
 def farthest(model: SwimModel, at: dict[str, float]) -> Floats:
-    """Compute how far poses are from the model, at the best start, at most: mm, mm, degrees."""
+    """Compute how far poses are from the model, at the best start and clock, at most: mm, mm, degrees."""
     off = model.runs.y - model.predict([at])[0]
-    starts = derivatives(model, at, model.sight.coefficients)[1].reshape(off.size, -1)
+    seen = [*model.sight.coefficients, *model.sight.nuisances]
+    starts = derivatives(model, at, seen)[1].reshape(off.size, -1)
     off -= (starts @ np.linalg.lstsq(starts, off.ravel(), rcond=None)[0]).reshape(off.shape)
     return np.abs(off).max(0) * [1e3 * model.runs.length, 1e3 * model.runs.length, 180 / np.pi]
 
@@ -74,8 +75,8 @@ def test_poses_are_those_of_the_simulator(robot: Robot, effects: dict[str, float
 @pytest.mark.slow
 def test_the_noise_needs_no_model() -> None:
     """A hidden effect does not hide in it."""
-    plan, found = plan_of(CONTROL), []
-    for effects in ({}, {"left_right_bias": 0.3}):
+    plan, found = plan_of(CONTROL, 3.0), []
+    for effects in ({}, {"left_right_bias": 0.1}):
         track = make_track(changed(CONTROL, **effects), plan, seed=1, kick=KICK)
         model, held_out = swim_model(CONTROL, read_swims(track, plan))
         plain = replace(model.sight, runs=replace(model.runs, noise_of_poses=None, y=model.runs.poses))
@@ -125,9 +126,10 @@ def test_of_a_robot_that_lacks_nothing_nothing_is_claimed() -> None:
 @pytest.mark.rest
 def test_the_corrected_robot_swims_the_path() -> None:
     """Planned with the verdict, the true robot is nearer to the path than planned with the robot as given."""
-    truth, path = changed(CONTROL, left_right_bias=0.1), plan_of(CONTROL)
-    again = sf.plan(sf.polygon(4, side=2.0), verdict_of(0.1))
-    before, after = (sf.check(plan, sf.replay(plan.schedule(truth))).raw_rms for plan in (path, again))
+    truth, again = changed(CONTROL, left_right_bias=0.1), sf.plan(sf.polygon(4, side=2.0), verdict_of(0.1))
+    exact = CameraNoise(white=(0.0, 0.0), slow=(0.0, 0.0))
+    tracks = [(plan, make_track(truth, plan, seed=0, camera=exact)) for plan in (plan_of(CONTROL), again)]
+    before, after = (sf.check(plan, track).raw_rms for plan, track in tracks)
     assert after < before / 3
 
 
@@ -139,6 +141,7 @@ def test_a_swim_is_reported_with_its_track(tmp_path: object) -> None:
     assert "left_right_bias" in corrected.read_text()
 
 
-def test_a_plan_is_for_a_track() -> None:
+def test_a_plan_is_for_a_robot() -> None:
+    model = sf.Model(lambda columns, numbers: {"v": numbers["k"]}, {"v": sf.Output()}, [sf.Number("k", 1.0)])
     with pytest.raises(InputError, match="plan is not for a model of your own"):
-        sf.calibrate("falls.csv", sf.Model(lambda c, p: {}, {}, []), plan="plan.json")
+        sf.calibrate("falls.csv", model, plan="plan.json")
