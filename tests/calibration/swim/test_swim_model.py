@@ -94,7 +94,9 @@ def test_the_noise_needs_no_model() -> None:
 def verdict_of(bias: float) -> RobotVerdict:
     plan = plan_of(CONTROL)
     truth = changed(CONTROL, **({"left_right_bias": bias} if bias else {}))
-    track = make_track(truth, plan, seed=2, kick=KICK, marker=(0.002, -0.001, 0.02), current=(2e-5, 0.0), scale=1.01)
+    track = make_track(
+        truth, plan, seed=2, kick=KICK, marker=(0.002, -0.001, 0.02), current=(2e-5, 0.0), scale=1.01
+    )
     verdict = sf.calibrate(track, CONTROL, plan=plan, progress=False)
     assert isinstance(verdict, RobotVerdict)
     return verdict
