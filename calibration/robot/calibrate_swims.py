@@ -15,6 +15,7 @@ from calibration.swim.swim_model import SwimModel, swim_model
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict import Verdict
 from common.arrays import Floats
+from sim.effects import effect_named, is_effect
 from sim.model.robot import Robot
 
 V = TypeVar("V", bound=Verdict)
@@ -47,7 +48,9 @@ def _sizes(model: SwimModel, result: Verdict) -> dict[str, float]:
     fits = sorted((c.fit.deviance, c.effect.name, c.size) for c in result.attribution.candidates if c.fit)
     named = {e.name: result.final.parameters[e.name] for e in model.effects if e.name in result.final.names}
     sizes = {name: size for _, name, size in fits[:_CANDIDATES]} | named
-    return {e.name: sizes[e.name] for e in model.effects if sizes.get(e.name, e.start) != e.start}
+    steps = {e.name: sizes[e.name] - e.start for e in model.effects if e.name in sizes and is_effect(e.name)}
+    # A swim with a non-local effect takes minutes.
+    return {name: step for name, step in steps.items() if step and effect_named(name).reach == "local"}
 
 
 def _moved(model: SwimModel, learnt: SwimModel, result: Verdict) -> Floats:
