@@ -2,16 +2,16 @@
 
 One robot, the base, is simulated in time steps (`sim.motion.replay`). Its motion in a dwell is that of the
 planner's vehicle (`planner.vehicle.vehicle`), lag and arc, and a small rest, which the vehicle leaves out. Other
-robots have twists of their own, solved for directly, and lags and a rest by their derivatives. So what a number
-changes costs a hundredth of a second. The rest matters where dwells are short, since a vehicle remembers one
-dwell, and with one or two tails, since it averages the phase of the disc at the flips.
+robots have the rest of the base, twists of their own, solved for directly, and lags by their derivatives from the
+nearest robot of which they are known. So what a number changes costs a hundredth of a second. The rest of another
+robot has another phase of the disc at each flip, so it counts as noise where it differs.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -28,11 +28,9 @@ from sim.model.groups import Groups
 from sim.model.schedule import Schedule
 from sim.motion.replay import stretches
 from sim.motion.response import responses
-from sim.motion.run import Resolution
 from sim.motion.steady import steady
 from sim.solve.march import YAW, X, Y
 
-TIME = "time"  # the unit of time, among columns
 _TOLERANCE, _MESHES = 1e-3, (4, 6)  # of the curves; differences of them count
 _SIDES = np.stack([np.ones(3), planar.MIRROR])
 _END = 1e-9  # of a dwell
@@ -48,12 +46,6 @@ class Swimming(NamedTuple):
     columns: Mapping[str, float]  # the motor forward
     time: float  # its unit of time [s]
     length: float  # and of length [m]
-
-    def change(self, name: str, other: Swimming) -> float:
-        """Compute by how much a column, or the logarithm of the unit of time, is above that of another robot."""
-        if name == TIME:
-            return math.log(self.time / other.time)
-        return self.columns.get(name, _null(name)) - other.columns.get(name, _null(name))
 
 
 class Lags(NamedTuple):
@@ -112,16 +104,6 @@ class Near:
             Swimming(_vehicle(twist[pair], [lags[place] for place in pair]), robots[pair[0]], unit, size)
             for pair, unit, size in zip(pairs.tolist(), time.tolist(), length.tolist(), strict=True)
         ]
-
-    def stepped(self, robot: Swimming, name: str, step: float) -> Swimming:
-        """Change a column of a robot, or the logarithm of its unit of time, by a step."""
-        if name == TIME:
-            return robot._replace(time=robot.time * math.exp(step))
-        changed = {**robot.columns, name: robot.columns.get(name, self._value(name)) + step}
-        columns = {key: np.array([value, value]) for key, value in changed.items()}
-        columns["omega_bar"] = columns["omega_bar"] * [1.0, -1.0]
-        units = np.array([robot.time]), np.array([robot.length])
-        return self.swimming(columns, np.array([[0, 1]]), *units)[0]
 
     def _value(self, name: str) -> float:
         return float(self.robot.get(name, _null(name)))
@@ -247,17 +229,15 @@ class Moments:
 class Base:
     """A robot that is simulated in time steps along a swim, and what its vehicle leaves out."""
 
-    robot: Swimming
     place: Floats  # (S,) dwells since the start, see `Moments.place`
     rest: Floats  # (S, 3), added to the changes of the vehicle, in l and rad
-    slopes: Mapping[str, Floats] = field(default_factory=dict)  # by columns, and by ln of the unit of time, (S, 3)
 
     @classmethod
-    def of(cls, swim: MeasuredSwim, robot: Swimming, resolution: Resolution | None = None) -> Base:
+    def of(cls, swim: MeasuredSwim, robot: Swimming) -> Base:
         """Simulate a robot along a swim."""
         dwells = swim.dwells / robot.time
         schedule = Schedule(robot.columns, swim.first_direction, dwells, (0.0, 0.0, 0.0), robot.time)
-        simulated = [each for each in stretches(schedule, resolution=resolution) if len(each.times)]
+        simulated = [each for each in stretches(schedule) if len(each.times)]
         dwell = np.concatenate([np.full(len(each.times), each.dwell) for each in simulated])
         poses = np.concatenate([each.poses[:, [X, Y, YAW]] for each in simulated])
         ends = np.concatenate([np.zeros((1, 3)), poses[np.flatnonzero(np.diff(dwell, append=-1))]])
@@ -267,27 +247,11 @@ class Base:
         marks = np.arange(len(swim.dwells), dtype=float)
         place = np.concatenate([at.place, marks])
         order = np.argsort(place, kind="stable")
-        return cls(robot, place[order], np.concatenate([rest, np.zeros((len(marks), 3))])[order])
+        return cls(place[order], np.concatenate([rest, np.zeros((len(marks), 3))])[order])
 
-    def at(self, place: Floats, robot: Swimming) -> Floats:
-        """Interpolate the rest of a robot near the base at places (n,), (n, 3)."""
-        rest = self.rest
-        for name, slope in self.slopes.items():
-            rest = rest + robot.change(name, self.robot) * slope
-        return np.stack([np.interp(place, self.place, column) for column in rest.T], -1)
-
-    def learnt(self, swim: MeasuredSwim, robots: Mapping[str, Swimming]) -> Base:
-        """Learn slopes from other robots, each of which differs in what it is called by.
-
-        Both ends of a difference are simulated on a coarse mesh.
-        """
-        coarse = Resolution.fitting(self.robot.columns["omega_bar"])
-        plain = Base.of(swim, self.robot, coarse).at(self.place, self.robot)
-        slopes = {
-            name: (Base.of(swim, robot, coarse).at(self.place, robot) - plain) / robot.change(name, self.robot)
-            for name, robot in robots.items()
-        }
-        return replace(self, slopes={**self.slopes, **slopes})
+    def at(self, place: Floats) -> Floats:
+        """Interpolate the rest at places (n,), (n, 3)."""
+        return np.stack([np.interp(place, self.place, column) for column in self.rest.T], -1)
 
 
 def course(changes: Floats, ends: Floats, at: Moments) -> tuple[Floats, Floats]:

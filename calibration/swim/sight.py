@@ -99,8 +99,8 @@ class Sight:
             moments, whole = Moments.of(swim, moment), Moments.whole(swim)
             changes, ends = (of.changes(robot) for of in (moments, whole))
             if self.bases:
-                changes = changes + self.bases[place].at(moments.place, robot)
-                ends = ends + self.bases[place].at(whole.place, robot)
+                changes = changes + self.bases[place].at(moments.place)
+                ends = ends + self.bases[place].at(whole.place)
             for each in (changes, ends):
                 each[:, :2] *= robot.length
             poses, flips = course(changes, ends, moments)

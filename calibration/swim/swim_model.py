@@ -18,7 +18,7 @@ from calibration.statistics.budget import count_predictions
 from calibration.statistics.fit import fit
 from calibration.statistics.forward import central
 from calibration.statistics.statistical_model import ForwardModel, Parameter, Parameters, Predict, start_values
-from calibration.swim.course import TIME, Base, Near, Swimming
+from calibration.swim.course import Base, Near, Swimming
 from calibration.swim.free_vehicle import with_noise
 from calibration.swim.measured_swim import MeasuredSwim
 from calibration.swim.sight import Sight
@@ -28,10 +28,8 @@ from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from common.arrays import Flags, Floats
 from common.errors import InputError
-from sim.effects import is_effect
 from sim.model.robot import Robot
 
-_STEP = 0.02  # of a number of the robot, for what the vehicle leaves out
 _ASKEW = math.radians(3.0)  # σ of the angle of a marker
 
 
@@ -91,25 +89,13 @@ class SwimModel:
         return self.near.swimming(columns, same, time, length)
 
     def based(self, at: Parameters) -> SwimModel:
-        """Simulate the robot at some parameters, and with each of its numbers changed, along all swims."""
+        """Simulate the robot at some parameters along all swims, as the base of all others."""
         columns = self.robot.simulated([self.sight.without(at)]).columns
-        robot = {name: abs(float(column[0])) for name, column in columns.items() if not is_effect(name)}
-        sizes = {name: float(column[0]) for name, column in columns.items() if is_effect(name)}
-        model = replace(self, near=Near({**robot, **sizes}), began=dict(at))
+        robot = {name: float(column[0]) for name, column in columns.items()}
+        model = replace(self, near=Near({**robot, "omega_bar": abs(robot["omega_bar"])}), began=dict(at))
         (base,) = model.swimming([at])
-        model = replace(
-            model, sight=replace(self.sight, bases=tuple(Base.of(swim, base) for swim in self.runs.swims))
-        )
-        return model.learnt({name: _STEP * value for name, value in robot.items() if name != "N"} | {TIME: _STEP})
-
-    def learnt(self, steps: Mapping[str, float]) -> SwimModel:
-        """Learn what the vehicle leaves out of steps of columns from the base: sizes of effects above it, say."""
-        bases = self.sight.bases
-        robots = {name: self.near.stepped(bases[0].robot, name, step) for name, step in steps.items()}
-        swims = zip(bases, self.runs.swims, strict=True)
-        return replace(
-            self, sight=replace(self.sight, bases=tuple(base.learnt(swim, robots) for base, swim in swims))
-        )
+        bases = tuple(Base.of(swim, base) for swim in self.runs.swims)
+        return replace(model, sight=replace(self.sight, bases=bases))
 
 
 def swim_model(
