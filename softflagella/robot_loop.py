@@ -54,8 +54,8 @@ def calibrate_robot(
         swims = read_swims(table, plan)
         for line in (line for swim in swims for line in swim.said):
             tell(line)
-        swum, rows = swim_model(robot, swims, jobs=jobs, progress=progress)
-        result = calibrate(swum, held_out=rows, **settings)
+        swum, last = swim_model(robot, swims, jobs=jobs, progress=progress)
+        result = calibrate(swum, held_out=last, **settings)
     else:
         data, rows = read_runs(table, protocol, tell)
         model = SwimmerModel(robot, data, jobs, own=own)
