@@ -115,9 +115,9 @@ def test_a_swim_is_filmed_with_errors_half_of_which_are_slow(tmp_path: Path) -> 
     run_steps([(Step("seen", "", ("--version",), {}, filmed="given.csv"),)], tmp_path)
     film = pd.read_csv(tmp_path / "film.csv")
     assert np.diff(film.time_s) == pytest.approx(0.5)
-    angle = 0.01 * film.time_s
-    errors = np.stack([film.x_cm - 10 * np.cos(angle), film.y_cm - 10 * np.sin(angle),
-                       film.heading_deg - np.degrees(angle)], 1) / [0.03, 0.03, 0.5]  # fmt: skip
+    seen_at = 0.01 * film.time_s
+    errors = np.stack([film.x_cm - 10 * np.cos(seen_at), film.y_cm - 10 * np.sin(seen_at),
+                       film.heading_deg - np.degrees(seen_at)], 1) / [0.03, 0.03, 0.5]  # fmt: skip
     assert errors.std(0) == pytest.approx(math.sqrt(2), rel=0.1)
     for later, memory in ((2, math.exp(-0.1)), (20, math.exp(-1)), (200, 0.0)):  # pictures
         assert (errors[later:] * errors[:-later]).mean() == pytest.approx(memory, abs=0.15)
@@ -126,7 +126,7 @@ def test_a_swim_is_filmed_with_errors_half_of_which_are_slow(tmp_path: Path) -> 
 def test_without_a_checkout_there_are_no_links_to_the_documentation(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert len(documentation(tmp_path)) == 6
+    assert len(documentation(tmp_path)) == 7
     monkeypatch.setattr("softflagella.demo_page._DOCS", tmp_path / "docs")
     assert documentation(tmp_path) == []
 
