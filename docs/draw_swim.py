@@ -54,11 +54,11 @@ def main() -> None:
     panels[0].set_ylabel("y [cm]")
     for axes in panels:
         axes.legend(frameon=False, loc="center", fontsize=9)
-    panels[0].set_title("a robot with a hidden effect swims a plan, and is filmed", fontsize=11)
+    panels[0].set_title("a robot with a hidden effect swims its plan, filmed", fontsize=11)
     panels[1].set_title(
         f"the film shows {' and '.join(verdict.effects).replace('_', ' ')}; planned again", fontsize=11
     )
-    figure.savefig(Path(__file__).with_name("one-swim.png"), dpi=90)
+    figure.savefig(Path(__file__).with_name("one-swim.png"), dpi=90, bbox_inches="tight")
 
 
 if __name__ == "__main__":
