@@ -11,12 +11,12 @@ from typing import Any, Literal
 import pandas as pd
 
 from calibration.laws.laws import find_laws
-from calibration.robot.calibrate_swims import calibrate_swims
 from calibration.robot.corrected_robot import check_given
 from calibration.robot.robot_verdict import RobotVerdict, read_runs
 from calibration.statistics.budget import Work
 from calibration.statistics.lab_settings import LabSettings
 from calibration.swim.measured_swim import PlanSource, is_track, read_swims
+from calibration.swim.swim_model import swim_model
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate
 from common.units import LengthUnit
@@ -54,7 +54,8 @@ def calibrate_robot(
         swims = read_swims(table, plan)
         for line in (line for swim in swims for line in swim.said):
             tell(line)
-        result = calibrate_swims(robot, swims, jobs=jobs, **settings)
+        swum, rows = swim_model(robot, swims, jobs=jobs, progress=progress)
+        result = calibrate(swum, held_out=rows, **settings)
     else:
         data, rows = read_runs(table, protocol, tell)
         model = SwimmerModel(robot, data, jobs, own=own)

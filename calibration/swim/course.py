@@ -2,18 +2,18 @@
 
 One robot, the base, is simulated in time steps (`sim.motion.replay`). Its motion in a dwell is that of the
 planner's vehicle (`planner.vehicle.vehicle`), lag and arc, and a small rest, which the vehicle leaves out. Other
-robots have the rest of the base, twists of their own, solved for directly, and lags by their derivatives. So what
-a number changes costs a hundredth of a second, and the rest falls out of differences.
-
-Lengths in m, times in s, headings in rad.
+robots have the rest of the base, twists of their own, solved for directly, and lags by their derivatives from the
+nearest robot of which they are known. So what a number changes costs a hundredth of a second. The rest of another
+robot has another phase of the disc at each flip, so it counts as noise where it differs.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,6 @@ from sim.effects import effect_named, is_effect
 from sim.inputs import check_columns
 from sim.mechanics import planar
 from sim.model.groups import Groups
-from sim.model.robot import Robot
 from sim.model.schedule import Schedule
 from sim.motion.replay import stretches
 from sim.motion.response import responses
@@ -36,7 +35,17 @@ _TOLERANCE, _MESHES = 1e-3, (4, 6)  # of the curves; differences of them count
 _SIDES = np.stack([np.ones(3), planar.MIRROR])
 _END = 1e-9  # of a dwell
 _STEP = 0.02  # of a number, and of the typical size of an effect, for derivatives of lags
+_FAR = 0.05  # of `_distance`, from which lags are simulated again
 _BROKE = "the simulation of a swim broke down; check the robot and its motor speed"
+
+
+class Swimming(NamedTuple):
+    """A robot as it moves in a swim."""
+
+    vehicle: Vehicle
+    columns: Mapping[str, float]  # the motor forward
+    time: float  # its unit of time [s]
+    length: float  # and of length [m]
 
 
 class Lags(NamedTuple):
@@ -46,18 +55,35 @@ class Lags(NamedTuple):
     rest: Floats  # (T, 3)
 
 
+class Centre(NamedTuple):
+    """A robot whose lags are simulated."""
+
+    columns: Mapping[str, float]  # the motor forward
+    lags: dict[int, Lags]  # by the direction of the motor
+
+
 @dataclass(frozen=True)
 class Near:
     """Vehicles of robots near one: their twists are solved for, their lags follow from derivatives at this one.
 
-    Curves take a hundred times as long as steady motions, and lags are a small part of a motion.
+    Lags take a hundred times as long as steady motions. They are simulated at the robot, and again wherever
+    another one is far from all that are known.
     """
 
     robot: Mapping[str, float]  # columns; the motor forward
-    known: dict[tuple[str, int], Lags] = field(default_factory=dict)  # "" the robot, by the direction of its motor
+    slopes: dict[tuple[str, int], Lags] = field(default_factory=dict)  # by column and direction of the motor
+    centres: list[Centre] = field(default_factory=list)
 
-    def vehicles(self, columns: Mapping[str, Floats], pairs: Integers) -> list[Vehicle]:
-        """Make P vehicles of pairs (P, 2) of B robots, with the motor forward and reversed.
+    def swimming(
+        self, columns: Mapping[str, Floats], pairs: Integers, time: Floats, length: Floats
+    ) -> list[Swimming]:
+        """Make P robots.
+
+        Args:
+            columns: of B robots.
+            pairs: (P, 2) those with the motor forward and reversed.
+            time: (P,) units of time [s].
+            length: (P,) units of length [m].
 
         Raises:
             InputError: a motion cannot be found.
@@ -69,50 +95,83 @@ class Near:
             raise InputError(_BROKE)
         direction = np.sign(columns["omega_bar"]).astype(int)
         twist[direction < 0] *= planar.MIRROR
-        values = {**columns, "omega_bar": np.abs(columns["omega_bar"])}
-        changes = {name: column - self._value(name) for name, column in values.items()}
-        changes = {name: change for name, change in changes.items() if change.any()}
-        senses = np.unique(direction).tolist()
-        self._learn([(name, sense) for sense in senses for name in ("", *changes)])
-        lags = []
-        for place, sense in enumerate(direction.tolist()):
-            lag, rest = self.known["", sense]
-            for name, change in changes.items():
-                if change[place]:
-                    slope = self.known[name, sense]
-                    lag, rest = lag + change[place] * slope.lag, rest + change[place] * slope.rest
-            lags.append(Lags(lag, rest))
-        return [_vehicle(twist[pair], [lags[place] for place in pair]) for pair in pairs.tolist()]
+        forward = {**columns, "omega_bar": np.abs(columns["omega_bar"])}
+        robots = [dict(zip(forward, row, strict=True)) for row in np.stack([*forward.values()], 1).tolist()]
+        moved = [name for name, column in forward.items() if (column != self._value(name)).any()]
+        self._learn([(name, sense) for sense in np.unique(direction).tolist() for name in moved])
+        lags = [self._lags(robot, sense) for robot, sense in zip(robots, direction.tolist(), strict=True)]
+        return [
+            Swimming(_vehicle(twist[pair], [lags[place] for place in pair]), robots[pair[0]], unit, size)
+            for pair, unit, size in zip(pairs.tolist(), time.tolist(), length.tolist(), strict=True)
+        ]
 
     def _value(self, name: str) -> float:
-        return float(self.robot.get(name, effect_named(name).null if is_effect(name) else 0.0))
+        return float(self.robot.get(name, _null(name)))
+
+    def _lags(self, robot: Mapping[str, float], sense: int) -> Lags:
+        """Compute lags by the derivatives from the nearest centre; without one nearby, the robot becomes one."""
+        near = min(self.centres, key=lambda centre: _distance(centre.columns, robot), default=None)
+        if near is None or _distance(near.columns, robot) > _FAR:
+            near = Centre(robot, {})
+            self.centres.append(near)
+        if sense not in near.lags:
+            (near.lags[sense],) = _simulated([near.columns], [sense])
+        lag, rest = near.lags[sense]
+        for name, value in robot.items():
+            if change := value - near.columns.get(name, _null(name)):
+                slope = self.slopes[name, sense]
+                lag, rest = lag + change * slope.lag, rest + change * slope.rest
+        return Lags(lag, rest)
 
     def _learn(self, wanted: Sequence[tuple[str, int]]) -> None:
-        """Simulate the lags of the robot, and their derivatives, that are not known."""
-        wanted = [each for each in wanted if each not in self.known]
+        """Simulate derivatives of the lags that are not known."""
+        wanted = [each for each in wanted if each not in self.slopes]
         if not wanted:
             return
-        at_robot = [("", sense) for sense in sorted({sense for _, sense in wanted})]
-        every = [*at_robot, *(each for each in wanted if each not in at_robot)]
-        names = {*self.robot, *(name for name, _ in wanted if name)}
-        columns = {name: np.full(len(every), self._value(name)) for name in names}
-        steps = np.zeros(len(every))
-        for place, (name, sense) in enumerate(every):
-            if name:
-                typical = effect_named(name).typical - effect_named(name).null if is_effect(name) else 0.0
-                steps[place] = _STEP * abs(typical or columns[name][place])
-                columns[name][place] += steps[place]
-            columns["omega_bar"][place] *= sense
-        curves = responses(Groups.from_columns(check_columns(columns)), tolerance=_TOLERANCE, meshes=_MESHES)
-        if curves.failed.any():
-            raise InputError(_BROKE)
-        lag, rest = lag_table(curves.lag, curves.memory, curves.before), resampled(curves.rest)
-        at = {sense: place for place, (name, sense) in enumerate(every) if not name}
-        for place, (name, sense) in enumerate(every):
-            found = Lags(lag[place], rest[place])
-            if name:
-                found = Lags(*((table[place] - table[at[sense]]) / steps[place] for table in (lag, rest)))
-            self.known[name, sense] = found
+        steps = [_STEP * (_typical(name) if is_effect(name) else self._value(name)) for name, _ in wanted]
+        senses = sorted({sense for _, sense in wanted})
+        stepped = [
+            {**self.robot, name: self._value(name) + step} for (name, _), step in zip(wanted, steps, strict=True)
+        ]
+        lags = _simulated([*(self.robot for _ in senses), *stepped], [*senses, *(sense for _, sense in wanted)])
+        at = dict(zip(senses, lags, strict=False))
+        for (name, sense), step, ahead in zip(wanted, steps, lags[len(senses) :], strict=True):
+            pairs = zip(ahead, at[sense], strict=True)
+            self.slopes[name, sense] = Lags(*((after - before) / step for after, before in pairs))
+
+
+def _null(name: str) -> float:
+    return float(effect_named(name).null) if is_effect(name) else 0.0
+
+
+def _typical(name: str) -> float:
+    return abs(float(effect_named(name).typical - effect_named(name).null))
+
+
+def _distance(robot: Mapping[str, float], other: Mapping[str, float]) -> float:
+    """Compute how far two robots are apart: in the logarithm of a number, or a tenth of a typical size."""
+    return max(
+        abs(robot.get(name, _null(name)) - other.get(name, _null(name))) / _typical(name) / 10
+        if is_effect(name)
+        else abs(math.log(robot[name] / other[name]))
+        for name in {*robot, *other}
+    )
+
+
+def _simulated(robots: Sequence[Mapping[str, float]], senses: Sequence[int]) -> list[Lags]:
+    """Simulate the lags of B robots, each in one direction of its motor.
+
+    Raises:
+        InputError: a flip breaks down.
+    """
+    names = sorted({name for robot in robots for name in robot})
+    columns = {name: np.array([robot.get(name, _null(name)) for robot in robots]) for name in names}
+    columns["omega_bar"] = columns["omega_bar"] * np.array(senses)
+    curves = responses(Groups.from_columns(check_columns(columns)), tolerance=_TOLERANCE, meshes=_MESHES)
+    if curves.failed.any():
+        raise InputError(_BROKE)
+    tables = lag_table(curves.lag, curves.memory, curves.before), resampled(curves.rest)
+    return [Lags(*each) for each in zip(*tables, strict=True)]
 
 
 def _vehicle(twist: Floats, lags: Sequence[Lags]) -> Vehicle:
@@ -154,16 +213,15 @@ class Moments:
         """Dwells since the start, with the share of the present one, (n,)."""
         return np.asarray(self.dwell + np.clip(self.elapsed / self.dwells[self.dwell], 0.0, 1 - _END))
 
-    def changes(self, vehicle: Vehicle, time: float, length: float) -> Floats:
-        """Compute the changes of the pose since the flip, (n, 3), of a vehicle with its units."""
+    def changes(self, of: Swimming) -> Floats:
+        """Compute the changes of the pose since the flip, (n, 3), in l and rad, of a vehicle."""
         result = np.empty((len(self.dwell), 3))
-        elapsed, dwells = self.elapsed / time, self.dwells / time
+        elapsed, dwells = self.elapsed / of.time, self.dwells / of.time
         before = dwells[np.maximum(self.dwell - 1, 0)]
         for sense, rows in ((1, self.forward), (-1, ~self.forward)):
-            result[rows] = vehicle.motion(sense, before[rows], elapsed[rows])
+            result[rows] = of.vehicle.motion(sense, before[rows], elapsed[rows])
             first = rows & (self.dwell == 0)
-            result[first] = vehicle.motion(sense, None, elapsed[first])
-        result[:, :2] *= length
+            result[first] = of.vehicle.motion(sense, None, elapsed[first])
         return result
 
 
@@ -172,38 +230,28 @@ class Base:
     """A robot that is simulated in time steps along a swim, and what its vehicle leaves out."""
 
     place: Floats  # (S,) dwells since the start, see `Moments.place`
-    rest: Floats  # (S, 3), added to the changes of the vehicle [m, rad]
-    slopes: Mapping[str, Floats] = field(default_factory=dict)  # by the size of an effect, (S, 3)
+    rest: Floats  # (S, 3), added to the changes of the vehicle, in l and rad
 
     @classmethod
-    def of(cls, swim: MeasuredSwim, robot: Robot, vehicle: Vehicle) -> Base:
+    def of(cls, swim: MeasuredSwim, robot: Swimming) -> Base:
         """Simulate a robot along a swim."""
-        time, length = robot.time_scale, robot.tail_length
-        schedule = Schedule(
-            robot.group_values(), swim.first_direction, np.diff(swim.flips) / time, (0.0, 0.0, 0.0), time, length
-        )
+        dwells = swim.dwells / robot.time
+        schedule = Schedule(robot.columns, swim.first_direction, dwells, (0.0, 0.0, 0.0), robot.time)
         simulated = [each for each in stretches(schedule) if len(each.times)]
         dwell = np.concatenate([np.full(len(each.times), each.dwell) for each in simulated])
-        poses = np.concatenate([each.poses[:, [X, Y, YAW]] for each in simulated]) * [length, length, 1.0]
+        poses = np.concatenate([each.poses[:, [X, Y, YAW]] for each in simulated])
         ends = np.concatenate([np.zeros((1, 3)), poses[np.flatnonzero(np.diff(dwell, append=-1))]])
-        elapsed = np.concatenate([each.times for each in simulated]) * time - (swim.flips - swim.flips[0])[dwell]
-        at = Moments(dwell, elapsed, schedule.dwells * time, swim.first_direction)
-        rest = planar.between(ends[dwell], poses) - at.changes(vehicle, time, length)
-        marks = np.arange(len(swim.flips) - 1.0)
+        elapsed = np.concatenate([each.times for each in simulated]) * robot.time
+        at = Moments(dwell, elapsed - (swim.flips - swim.flips[0])[dwell], swim.dwells, swim.first_direction)
+        rest = planar.between(ends[dwell], poses) - at.changes(robot)
+        marks = np.arange(len(swim.dwells), dtype=float)
         place = np.concatenate([at.place, marks])
         order = np.argsort(place, kind="stable")
         return cls(place[order], np.concatenate([rest, np.zeros((len(marks), 3))])[order])
 
-    def at(self, place: Floats, sizes: Mapping[str, Any]) -> Floats:
-        """Interpolate the rest at places (n,), (n, 3), with effects of some sizes above their null."""
-        rest = self.rest
-        for name, slope in self.slopes.items():
-            rest = rest + sizes.get(name, 0.0) * slope
-        return np.stack([np.interp(place, self.place, column) for column in rest.T], -1)
-
-    def with_slope(self, name: str, size: float, other: Base) -> Base:
-        """Learn the slope by an effect from the same robot with that effect."""
-        return replace(self, slopes={**self.slopes, name: (other.at(self.place, {}) - self.rest) / size})
+    def at(self, place: Floats) -> Floats:
+        """Interpolate the rest at places (n,), (n, 3)."""
+        return np.stack([np.interp(place, self.place, column) for column in self.rest.T], -1)
 
 
 def course(changes: Floats, ends: Floats, at: Moments) -> tuple[Floats, Floats]:

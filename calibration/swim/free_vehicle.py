@@ -24,6 +24,7 @@ import numpy as np
 from calibration.statistics.fit import fit
 from calibration.statistics.forward import central
 from calibration.statistics.statistical_model import Parameter, Parameters, Predict, start_values
+from calibration.swim.course import Swimming
 from calibration.swim.pose_noise import Sizes, estimate_noise
 from calibration.swim.sight import Sight
 from calibration.swim.swim_runs import SwimRuns
@@ -42,9 +43,7 @@ class FreeVehicle:
     """Predicts the poses of swims by a vehicle with free numbers."""
 
     sight: Sight
-    vehicle: Vehicle
-    time: float  # its unit [s]
-    length: float  # its unit [m]
+    robot: Swimming  # as given
 
     @property
     def runs(self) -> SwimRuns:
@@ -66,7 +65,7 @@ class FreeVehicle:
 
     def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
         """Predict (P, n, 3), see `ForwardModel`."""
-        return self.sight.predict([(one, self._changed(one), self.time, self.length) for one in sets])
+        return self.sight.predict((one, self.robot._replace(vehicle=self._changed(one))) for one in sets)
 
     def linearised(
         self, at: Parameters, along: Sequence[Parameter], *, title: str = "", quick: bool = False
@@ -83,20 +82,19 @@ class FreeVehicle:
         turned = (1 - np.exp(-TIMES / _TURNING))[:, None]
         kept = np.exp(-BEFORE_KNOTS / _REMEMBERED)[:, None, None]
         changed = turned * (lag[:, None, None] + kept * memory[:, None, None])
-        rest = self.vehicle.rest + turned * lag[:, None]
-        return replace(self.vehicle, twist=self.vehicle.twist + twist, lag=self.vehicle.lag + changed, rest=rest)
+        given = self.robot.vehicle
+        rest = given.rest + turned * lag[:, None]
+        return replace(given, twist=given.twist + twist, lag=given.lag + changed, rest=rest)
 
 
-def with_noise(
-    sight: Sight, vehicle: Vehicle, time: float, length: float, used: Flags
-) -> tuple[SwimRuns, dict[str, float]]:
+def with_noise(sight: Sight, robot: Swimming, used: Flags) -> tuple[SwimRuns, dict[str, float]]:
     """Estimate the noise of swims.
 
     The first fit compares changes of the pose rather than poses, so it finds its way from far.
 
     Args:
         sight: with runs that are not white.
-        vehicle: of the robot as given, with its units of time [s] and length [m].
+        robot: as given.
         used: (n,) poses.
 
     Returns:
@@ -104,7 +102,7 @@ def with_noise(
     """
     plain = sight.runs
     runs = plain.in_noise(_ROUGH, plain.poses)
-    model = FreeVehicle(sight, vehicle, time, length)
+    model = FreeVehicle(sight, robot)
     at: dict[str, float] = start_values(model)
     names = tuple(at)
     for _ in range(_PASSES):

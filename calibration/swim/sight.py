@@ -12,7 +12,7 @@ Fitted as well as what the vehicle is, since no swim is without them:
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -20,11 +20,10 @@ from typing import Any
 import numpy as np
 
 from calibration.statistics.statistical_model import Parameter, Parameters
-from calibration.swim.course import Base, Moments, course
+from calibration.swim.course import Base, Moments, Swimming, course
 from calibration.swim.swim_runs import SwimRuns, first_of_last
 from calibration.swimmer.influences import CAMERA, CURRENT, HEADING
 from common.arrays import Floats
-from planner.vehicle.vehicle import Vehicle
 from sim.mechanics import planar
 
 AHEAD, LEFT, CLOCK = "marker_ahead", "marker_left", "clock_offset"
@@ -70,12 +69,8 @@ class Sight:
         own = {p.name for p in (*self.coefficients, *self.nuisances)}
         return {name: value for name, value in parameters.items() if name not in own}
 
-    def predict(self, sets: Sequence[tuple[Parameters, Vehicle, float, float]]) -> Floats:
-        """Predict the poses (P, n, 3), white in the noise of the runs.
-
-        Args:
-            sets: parameters, the vehicle, and its units of time [s] and length [m].
-        """
+    def predict(self, sets: Iterable[tuple[Parameters, Swimming]]) -> Floats:
+        """Predict the poses (P, n, 3) of robots, white in the noise of the runs."""
         poses = np.stack([self._seen(*each) for each in sets])
         poses[..., :2] /= self.runs.length
         return np.moveaxis(self.runs.whitened(np.moveaxis(poses, 0, -1)), -1, 0)
@@ -93,7 +88,7 @@ class Sight:
             starts.append(Parameter(f"{number}: {name}", title, value, ends, **own, **of))
         return starts
 
-    def _seen(self, at: Parameters, vehicle: Vehicle, time: float, length: float) -> Floats:
+    def _seen(self, at: Parameters, robot: Swimming) -> Floats:
         """Compute the poses (n, 3) that a camera sees [m, rad]."""
         runs, value = self.runs, {p.name: p.start for p in (*self.coefficients, *self.nuisances)} | dict(at)
         current = np.array([value[name] for name in CURRENT])
@@ -102,10 +97,12 @@ class Sight:
         for place, swim in enumerate(runs.swims):
             own, moment = runs.session == place, swim.time - value[CLOCK]
             moments, whole = Moments.of(swim, moment), Moments.whole(swim)
-            changes, ends = (of.changes(vehicle, time, length) for of in (moments, whole))
+            changes, ends = (of.changes(robot) for of in (moments, whole))
             if self.bases:
-                changes = changes + self.bases[place].at(moments.place, value)
-                ends = ends + self.bases[place].at(whole.place, value)
+                changes = changes + self.bases[place].at(moments.place)
+                ends = ends + self.bases[place].at(whole.place)
+            for each in (changes, ends):
+                each[:, :2] *= robot.length
             poses, flips = course(changes, ends, moments)
             for part in (2 * place, 2 * place + 1):
                 rows, first = runs.part[own] == part, first_of_last(swim) * (part % 2)

@@ -18,7 +18,7 @@ from calibration.statistics.budget import count_predictions
 from calibration.statistics.fit import fit
 from calibration.statistics.forward import central
 from calibration.statistics.statistical_model import ForwardModel, Parameter, Parameters, Predict, start_values
-from calibration.swim.course import Base, Near
+from calibration.swim.course import Base, Near, Swimming
 from calibration.swim.free_vehicle import with_noise
 from calibration.swim.measured_swim import MeasuredSwim
 from calibration.swim.sight import Sight
@@ -28,7 +28,6 @@ from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from common.arrays import Flags, Floats
 from common.errors import InputError
-from planner.vehicle.vehicle import Vehicle
 from sim.model.robot import Robot
 
 _ASKEW = math.radians(3.0)  # σ of the angle of a marker
@@ -74,7 +73,7 @@ class SwimModel:
 
     def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
         """Predict (P, n, 3), see `ForwardModel`."""
-        return self.sight.predict([(one, *of) for one, of in zip(sets, self.vehicles(sets), strict=True)])
+        return self.sight.predict(zip(sets, self.swimming(sets), strict=True))
 
     def linearised(
         self, at: Parameters, along: Sequence[Parameter], *, title: str = "", quick: bool = False
@@ -82,39 +81,21 @@ class SwimModel:
         """Return the linear model, by differences."""
         return central(self, at, along, title=title)
 
-    def vehicles(self, sets: Sequence[Parameters]) -> list[tuple[Vehicle, float, float]]:
-        """Make the vehicles of P parameter sets, with their units of time [s] and length [m]."""
+    def swimming(self, sets: Sequence[Parameters]) -> list[Swimming]:
+        """Make the robots of P parameter sets."""
         inputs, columns, same, _ = self.robot.simulated([self.sight.without(one) for one in sets])
         count_predictions(len(columns["N"]))
         length, time = (np.broadcast_to(x, same.shape)[:, 0] for x in (inputs.view.length, inputs.view.time))
-        vehicles = self.near.vehicles(columns, same)
-        return list(zip(vehicles, time.tolist(), length.tolist(), strict=True))
+        return self.near.swimming(columns, same, time, length)
 
     def based(self, at: Parameters) -> SwimModel:
         """Simulate the robot at some parameters along all swims, as the base of all others."""
         columns = self.robot.simulated([self.sight.without(at)]).columns
         robot = {name: float(column[0]) for name, column in columns.items()}
         model = replace(self, near=Near({**robot, "omega_bar": abs(robot["omega_bar"])}), began=dict(at))
-        return replace(model, sight=replace(self.sight, bases=model._bases(at)))
-
-    def learnt(self, sizes: Mapping[str, float]) -> SwimModel:
-        """Learn, for effects of some sizes, what the vehicle leaves out of them.
-
-        An effect may depend on the phase of the disc at the flips, which the vehicle averages.
-        """
-        sight = self.sight
-        for name, size in sizes.items():
-            null = next(effect.start for effect in self.effects if effect.name == name)
-            others = self._bases({**self.began, name: size})
-            pairs = zip(sight.bases, others, strict=True)
-            sight = replace(sight, bases=tuple(base.with_slope(name, size - null, other) for base, other in pairs))
-        return replace(self, sight=sight)
-
-    def _bases(self, at: Parameters) -> tuple[Base, ...]:
-        """Simulate a robot along all swims."""
-        ((vehicle, _, _),) = self.vehicles([at])
-        robot = self.robot.robots(self.sight.without(at))[0]
-        return tuple(Base.of(swim, robot, vehicle) for swim in self.runs.swims)
+        (base,) = model.swimming([at])
+        bases = tuple(Base.of(swim, base) for swim in self.runs.swims)
+        return replace(model, sight=replace(self.sight, bases=bases))
 
 
 def swim_model(
@@ -130,8 +111,8 @@ def swim_model(
     model = SwimModel(SwimmerModel(robot, _both_directions(robot), jobs), Sight(runs), runs)
     start = start_values(model)
     model = model.based(start)
-    ((vehicle, time, length),) = model.vehicles([start])
-    runs, start_of_parts = with_noise(model.sight, vehicle, time, length, used)
+    (given,) = model.swimming([start])
+    runs, start_of_parts = with_noise(model.sight, given, used)
     model = replace(model, sight=replace(model.sight, runs=runs), runs=runs)
     names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
     first = fit(model, {**start, **start_of_parts}, names, used, title="first fit" if progress else "")
