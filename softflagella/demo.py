@@ -17,20 +17,30 @@ from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 
+import numpy as np
+
+from calibration.swim.pose_noise import PoseNoise, Sizes
 from calibration.swimmer.synthetic_table import make_table
 from common.errors import InputError
 from common.files import write_csv
 from common.progress import progress_bar
+from common.tables import read_table
 from sim.inputs import save_robot
 from sim.model.presets import PRESETS
 from sim.motion.warm import compile_once
 from sim.threads import available_jobs
 from softflagella.demo_page import write_page
 from softflagella.demo_steps import CHAINS, Done, Step
+from tracking.tracks import LAB
 
 # The robot behind the tables of runs; calibration starts from the paper's coefficients.
 _HIDDEN = {"C_t": 3.1, "C_r": 2.4, "C_yr": 4.4}
 _LENGTHS_CM = (6.0, 7.5, 9.0)
+_BIAS = 0.05  # of the robot that swims, otherwise the paper's control robot, with coefficients that are off
+_OFF = {"C_t": 1.03, "C_r": 0.97, "C_yr": 1.03}
+# Of the camera: time between pictures [s]; errors of places [cm] and headings [°], white and again as slow ones;
+# memory of these [s].
+_EVERY, _ERRORS, _MEMORY = 0.5, np.array([0.03, 0.5]), 10.0
 
 
 def run_demo(out: str | Path) -> None:
@@ -46,12 +56,26 @@ def run_demo(out: str | Path) -> None:
 
 
 def _write_hidden(folder: Path) -> None:
-    """Write the robot with the hidden effect, and a table of its runs and one of runs without the effect."""
+    """Write the robot that swims, a table of runs with an effect that is hidden, and one without."""
+    given = PRESETS["paper-control"]
+    off = {name: factor * getattr(given, name) for name, factor in _OFF.items()}
+    save_robot(replace(given, **off, effects={"left_right_bias": _BIAS}), folder / "truth.toml")
     for name, seed, effects in (("hidden-effect", 3, {"end_over_end_drag": 5.0}), ("nothing-hidden", 4, {})):
         truth = replace(PRESETS["paper-measured"], **_HIDDEN, effects=effects)  # type: ignore[arg-type]
         write_csv(make_table(truth, seed=seed, lengths_cm=_LENGTHS_CM), folder / name / "runs.csv", digits=6)
-        if effects:
-            save_robot(replace(truth, tails=2).with_motor(10.0), folder / "truth.toml")
+
+
+def _film(track: Path) -> None:
+    """Write what a camera sees of a simulated track, with its errors, as film.csv beside it."""
+    swim = read_table(track)
+    time = np.arange(0.0, swim["time_s"].iloc[-1], _EVERY)
+    poses = [swim[name] for name in LAB[1:3]] + [np.unwrap(swim[LAB[3]], period=360)]
+    still = np.zeros(len(time), dtype=int)
+    sizes = Sizes(_ERRORS, _ERRORS, 0 * _ERRORS, _MEMORY)
+    noise = PoseNoise(still, time, still, np.zeros((len(time), 2)), sizes)
+    exact = np.stack([np.interp(time, swim["time_s"], values) for values in poses], 1)
+    seen = exact + noise.colour(np.random.default_rng(5).standard_normal((len(time), 3)))
+    write_csv(dict(zip(LAB, (time, *seen.T), strict=True)), track.with_name("film.csv"), digits=6)
 
 
 def run_steps(chains: Sequence[Sequence[Step]], folder: Path) -> list[Done]:
@@ -62,7 +86,7 @@ def run_steps(chains: Sequence[Sequence[Step]], folder: Path) -> list[Done]:
     """
 
     def run(steps: Sequence[Step]) -> list[Done]:
-        return [Done(step, [_run(words, folder) for words in step.commands]) for step in steps]
+        return [_run_step(step, folder) for step in steps]
 
     done, bar = list[Done](), progress_bar("demo", total=sum(map(len, chains)), unit="step")
     with bar as shown, ThreadPoolExecutor(available_jobs()) as pool:
@@ -71,6 +95,12 @@ def run_steps(chains: Sequence[Sequence[Step]], folder: Path) -> list[Done]:
             shown.update(len(steps))
             shown.write("\n".join(line for step in steps for line in step.lines()))
     return done
+
+
+def _run_step(step: Step, folder: Path) -> Done:
+    if step.filmed:
+        _film(folder / step.filmed)
+    return Done(step, [_run(words, folder) for words in step.commands])
 
 
 def _run(words: str, folder: Path) -> str:

@@ -24,7 +24,8 @@ _DOCS = Path(__file__).parents[1] / "docs"
 _PAGE_PICTURE = _DOCS / "page.png"  # of the page that plans; there is none without a checkout
 _PAGES = (  # of the documentation: name without suffix, title, what it is
     ("tutorial/schedule", "From a robot to a schedule", "the first tutorial, ten minutes"),
-    ("tutorial/calibration", "Calibrating the model", "the second tutorial"),
+    ("tutorial/one-swim", "From one swim to a corrected robot", "the second tutorial"),
+    ("tutorial/calibration", "Calibrating the model", "the third tutorial, with a table of runs"),
     ("howto/tank", "Calibrate your tank", "which runs to make"),
     ("reference/signs", "Signs and frames", "which way +1 turns, and a check on the bench"),
     ("explanation/lookup", "The look-up table", "what it learns, and how far it is from the simulator"),
@@ -33,7 +34,7 @@ _PAGES = (  # of the documentation: name without suffix, title, what it is
 _YOURS = (
     "softflagella robot paper-control --out robot.toml",
     "softflagella plan square:30cm --robot robot.toml --out plan",
-    "softflagella replay plan/plan.json --out track.csv",
+    "softflagella replay plan/plan.json --out simulated.csv",
 )
 
 
@@ -44,7 +45,7 @@ def write_page(out: Path, steps: Sequence[Done], seconds: float) -> None:
         "A motor in a cylindrical head turns straight elastic tails just below the surface of a viscous fluid. "
         "Its only control input is the direction of the motor. On this page the robot is simulated, its motion "
         "learned, three paths are planned without simulating and replayed in the simulator, and the model is "
-        "corrected from measurements. The commands were run in the folder `demo` beside this page.",
+        "corrected from one swim, or from runs. The commands were run in the folder `demo` beside this page.",
     )
     for done in steps:
         step = done.step
@@ -63,8 +64,8 @@ def write_page(out: Path, steps: Sequence[Done], seconds: float) -> None:
     page.text(
         "The first writes an example: put in the numbers of your robot and of your fluid. The second plans a "
         "square with sides of 30 cm; a path can be a circle, a polygon, a table of points or an SVG drawing. The "
-        "third simulates the schedule. With a table of runs of your own, `softflagella calibrate runs.csv --robot "
-        "robot.toml --out calibrated` says what the model lacks, and corrects it."
+        "third simulates the schedule. With a track of your robot, `softflagella calibrate track.csv --robot "
+        "robot.toml --plan plan/plan.json --out calibrated` says what the model lacks, and corrects it."
     )
     page.links(documentation(out.parent))
     page.write(out, f"code {code_version()}, made in {format_time(seconds)}")

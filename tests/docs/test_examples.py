@@ -22,7 +22,7 @@ from tests.processes import LIMIT, ROOT
 RUN = ("sh", "python")
 LONG = {"tutorial/schedule.md", "howto/sweep.md", "howto/goal.md", "howto/jobs.md", "howto/page.md",
         "howto/query.md", "howto/tracker.md"}  # fmt: skip
-LONGEST = {"tutorial/calibration.md", "tutorial/bad-day.md", "tutorial/film.md"}
+LONGEST = {"tutorial/calibration.md", "tutorial/bad-day.md", "tutorial/film.md", "tutorial/one-swim.md"}
 SIMPLE = re.compile(r"softflagella [^|<>$*;&`]+")  # a command that needs no shell
 SHOWN = {*RUN, "toml", "text", "js"}
 

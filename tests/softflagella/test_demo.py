@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import shlex
 from collections.abc import Mapping
@@ -10,9 +11,12 @@ from itertools import pairwise
 from pathlib import Path
 from urllib.parse import unquote
 
+import numpy as np
+import pandas as pd
 import pytest
 
 from common.errors import InputError
+from common.files import write_csv
 from planner.jobs.plan import plan
 from planner.paths.path import Path2D, polygon
 from sim.model.presets import PRESETS
@@ -54,6 +58,7 @@ def test_a_stranger_finds_every_step_with_its_commands_and_every_file_one_click_
     assert {
         "demo/robot.toml", "demo/page.html", "demo/sweep.html", "demo/model.md", "demo/square/schedule.h",
         "demo/triangle/plan.json", "demo/hidden-effect/report.html", "demo/nothing-hidden/corrected.toml",
+        "demo/swim/film.csv", "demo/swim/report.html", "demo/swim/corrected.toml", "demo/truth.toml",
     } <= set(files)  # fmt: skip
     assert any(file.endswith(("signs.md", "signs.html")) for file in files)
     assert "prefers-color-scheme: dark" in html  # one file in both colours
@@ -73,12 +78,16 @@ def test_what_a_step_reads_is_written_before() -> None:
     before = {"hidden-effect/runs.csv", "nothing-hidden/runs.csv", "truth.toml"}
     for chain in CHAINS:
         written = set(before)
-        for words in (shlex.split(words) for step in chain for words in step.commands):
-            options = dict(pairwise(words))
-            outputs = {options.get("--out"), options.get("--plot"), str(SWEEP_TOML)}
-            inputs = [w for w in words if Path(w).suffix in (".toml", ".csv", ".json") and w not in outputs]
-            assert [w for w in inputs if not {w, str(Path(w).parent)} & written] == []
-            written |= {str(output) for output in outputs}
+        for step in chain:
+            if step.filmed:
+                assert step.filmed in written
+                written.add(str(Path(step.filmed).with_name("film.csv")))
+            for words in map(shlex.split, step.commands):
+                options = dict(pairwise(words))
+                outputs = {options.get("--out"), options.get("--plot"), str(SWEEP_TOML)}
+                inputs = [w for w in words if Path(w).suffix in (".toml", ".csv", ".json") and w not in outputs]
+                assert [w for w in inputs if not {w, str(Path(w).parent)} & written] == []
+                written |= {str(output) for output in outputs}
         before |= written if chain is CHAINS[0] else set()
 
 
@@ -96,10 +105,28 @@ def test_steps_print_their_commands_in_order_or_fail(tmp_path: Path, capfd: pyte
     assert [line.split()[0] for line in done[1].lines()] == ["$", "softflagella", "$", "vehicle"]
 
 
+def test_a_swim_is_filmed_with_errors_half_of_which_are_slow(tmp_path: Path) -> None:
+    """The robot goes round a circle, its heading beyond 180°."""
+    time = np.arange(0.0, 2000.0, 0.3)
+    angle = 0.01 * time
+    track = {"time_s": time, "x_cm": 10 * np.cos(angle), "y_cm": 10 * np.sin(angle),
+             "heading_deg": (np.degrees(angle) + 180) % 360 - 180}  # fmt: skip
+    write_csv(track, tmp_path / "given.csv")
+    run_steps([(Step("seen", "", ("--version",), {}, filmed="given.csv"),)], tmp_path)
+    film = pd.read_csv(tmp_path / "film.csv")
+    assert np.diff(film.time_s) == pytest.approx(0.5)
+    seen_at = 0.01 * film.time_s
+    errors = np.stack([film.x_cm - 10 * np.cos(seen_at), film.y_cm - 10 * np.sin(seen_at),
+                       film.heading_deg - np.degrees(seen_at)], 1) / [0.03, 0.03, 0.5]  # fmt: skip
+    assert errors.std(0) == pytest.approx(math.sqrt(2), rel=0.1)
+    for later, memory in ((2, math.exp(-0.1)), (20, math.exp(-1)), (200, 0.0)):  # pictures
+        assert (errors[later:] * errors[:-later]).mean() == pytest.approx(memory, abs=0.15)
+
+
 def test_without_a_checkout_there_are_no_links_to_the_documentation(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert len(documentation(tmp_path)) == 6
+    assert len(documentation(tmp_path)) == 7
     monkeypatch.setattr("softflagella.demo_page._DOCS", tmp_path / "docs")
     assert documentation(tmp_path) == []
 
