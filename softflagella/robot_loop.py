@@ -54,7 +54,7 @@ def calibrate_robot(
         swims = read_swims(table, plan)
         for line in (line for swim in swims for line in swim.said):
             tell(line)
-        swum, last = swim_model(robot, swims, jobs=jobs, progress=progress)
+        swum, last = swim_model(robot, swims, jobs=jobs)
         result = calibrate(swum, held_out=last, **settings)
     else:
         data, rows = read_runs(table, protocol, tell)

@@ -35,7 +35,7 @@ _TOLERANCE, _MESHES = 1e-3, (4, 6)  # of the curves; differences of them count
 _SIDES = np.stack([np.ones(3), planar.MIRROR])
 _END = 1e-9  # of a dwell
 _STEP = 0.02  # of a number, and of the typical size of an effect, for derivatives of lags
-_FAR = 0.05  # of `_distance`, from which lags are simulated again
+_FAR = 0.08  # of `_distance`, from which lags are simulated again
 _BROKE = "the simulation of a swim broke down; check the robot and its motor speed"
 
 
@@ -149,9 +149,9 @@ def _typical(name: str) -> float:
 
 
 def _distance(robot: Mapping[str, float], other: Mapping[str, float]) -> float:
-    """Compute how far two robots are apart: in the logarithm of a number, or a tenth of a typical size."""
+    """Compute how far two robots are apart: in the logarithm of a number, or a fortieth of a typical size."""
     return max(
-        abs(robot.get(name, _null(name)) - other.get(name, _null(name))) / _typical(name) / 10
+        abs(robot.get(name, _null(name)) - other.get(name, _null(name))) / _typical(name) / 40
         if is_effect(name)
         else abs(math.log(robot[name] / other[name]))
         for name in {*robot, *other}

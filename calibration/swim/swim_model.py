@@ -1,8 +1,8 @@
 """A robot and its swims as a model for the calibration: what was seen of a path tells what the model lacks.
 
 The numbers and effects of the robot are those of `calibration.swimmer`, the poses those of
-`calibration.swim.sight`. The base of the courses is the robot as first fitted. The noise is that of
-`calibration.swim.free_vehicle`, which knows no robot.
+`calibration.swim.sight`. The base of the courses is the robot as given: a fit that lacks an effect is farther from
+the truth. The noise is that of `calibration.swim.free_vehicle`, which knows no robot.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from calibration.statistics.budget import count_predictions
-from calibration.statistics.fit import fit
 from calibration.statistics.forward import central
 from calibration.statistics.statistical_model import ForwardModel, Parameter, Parameters, Predict, start_values
 from calibration.swim.course import Base, Near, Swimming
@@ -41,7 +40,7 @@ class SwimModel:
     sight: Sight
     runs: SwimRuns  # those of the sight
     near: Near = field(default_factory=lambda: Near({}))  # the base
-    began: Mapping[str, float] = field(default_factory=dict)  # its parameters
+    began: Mapping[str, float] = field(default_factory=dict)  # where fits begin
 
     @property
     def coefficients(self) -> tuple[Parameter, ...]:
@@ -64,7 +63,7 @@ class SwimModel:
         """Accept poses in any units that they name: a start is fitted."""
 
     def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
-        """Return the parameters of a first fit."""
+        """Return where a vehicle that is fitted to the poses begins."""
         return {**start, **self.began}
 
     def possible(self) -> tuple[ForwardModel, list[dict[str, Any]]]:
@@ -92,16 +91,14 @@ class SwimModel:
         """Simulate the robot at some parameters along all swims, as the base of all others."""
         columns = self.robot.simulated([self.sight.without(at)]).columns
         robot = {name: float(column[0]) for name, column in columns.items()}
-        model = replace(self, near=Near({**robot, "omega_bar": abs(robot["omega_bar"])}), began=dict(at))
+        model = replace(self, near=Near({**robot, "omega_bar": abs(robot["omega_bar"])}))
         (base,) = model.swimming([at])
         bases = tuple(Base.of(swim, base) for swim in self.runs.swims)
         return replace(model, sight=replace(self.sight, bases=bases))
 
 
-def swim_model(
-    robot: Robot, swims: Sequence[MeasuredSwim], *, jobs: int | None = None, progress: bool = False
-) -> tuple[SwimModel, Flags]:
-    """Make the model of a robot's swims, with the noise of the poses, and with its base at a first fit.
+def swim_model(robot: Robot, swims: Sequence[MeasuredSwim], *, jobs: int | None = None) -> tuple[SwimModel, Flags]:
+    """Make the model of a robot's swims, with the noise of the poses.
 
     Returns:
         The model, and the poses (n,) that are held out.
@@ -112,11 +109,9 @@ def swim_model(
     start = start_values(model)
     model = model.based(start)
     (given,) = model.swimming([start])
-    runs, start_of_parts = with_noise(model.sight, given, used)
-    model = replace(model, sight=replace(model.sight, runs=runs), runs=runs)
-    names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
-    first = fit(model, {**start, **start_of_parts}, names, used, title="first fit" if progress else "")
-    return model.based(first.parameters), held_out
+    runs, seen = with_noise(model.sight, given, used)
+    began = {**start, **seen}
+    return replace(model, sight=replace(model.sight, runs=runs), runs=runs, began=began), held_out
 
 
 def _both_directions(robot: Robot) -> Measurements:
