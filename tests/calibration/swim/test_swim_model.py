@@ -12,6 +12,7 @@ import softflagella as sf
 from calibration.robot.robot_verdict import RobotVerdict
 from calibration.statistics.forward import derivatives
 from calibration.statistics.statistical_model import start_values
+from calibration.swim.course import Near, Swimming
 from calibration.swim.free_vehicle import with_noise
 from calibration.swim.measured_swim import MeasuredSwim, read_swims
 from calibration.swim.pose_noise import Sizes
@@ -92,6 +93,24 @@ def test_the_noise_needs_no_model() -> None:
     truth = [*camera.white, *camera.slow, *KICK]
     assert (np.abs(np.log(np.array(found) / truth)) < 0.5).all()
     assert (np.abs(np.log(found[0] / found[1])) < 0.2).all()
+
+
+@pytest.mark.slow
+def test_a_fit_turns_back_where_a_robot_cannot_be_simulated(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It ends neither the fit nor the verdict."""
+    (swim,) = read_swims(make_track(CONTROL, plan_of(CONTROL), seed=0), plan_of(CONTROL))
+    model, _ = swim_model(CONTROL, [swim])
+    start = start_values(model)
+
+    def broken(*_: object) -> list[Swimming]:
+        raise InputError("broke down")
+
+    monkeypatch.setattr(Near, "swimming", broken)
+    seen, slopes = derivatives(model, start, ["C_t"], quick=True)
+    assert np.isnan(seen).all()
+    assert np.isnan(slopes).all()
+    with pytest.raises(InputError, match="broke down"):
+        derivatives(model, start, ["C_t"])
 
 
 @cache
