@@ -20,7 +20,8 @@ import numpy as np
 from calibration.swim.measured_swim import MeasuredSwim
 from common.arrays import Flags, Floats, Integers
 from common.errors import InputError
-from planner.vehicle.vehicle import Vehicle, lag_table, resampled
+from planner.vehicle.from_table import mirrored
+from planner.vehicle.vehicle import Vehicle, chained, lag_table, resampled
 from sim.effects import effect_named, is_effect
 from sim.inputs import check_columns
 from sim.mechanics import planar
@@ -32,7 +33,6 @@ from sim.motion.steady import steady
 from sim.solve.march import YAW, X, Y
 
 _TOLERANCE, _MESHES = 1e-3, (4, 6)  # of the curves; differences of them count
-_SIDES = np.stack([np.ones(3), planar.MIRROR])
 _END = 1e-9  # of a dwell
 _STEP = 0.02  # of a number, and of the typical size of an effect, for derivatives of lags
 _FAR = 0.08  # of `_distance`, from which lags are simulated again
@@ -177,8 +177,7 @@ def _simulated(robots: Sequence[Mapping[str, float]], senses: Sequence[int]) -> 
 def _vehicle(twist: Floats, lags: Sequence[Lags]) -> Vehicle:
     """Make a vehicle of the twists (2, 3) and lags in both directions, as seen for a positive motor."""
     lag, rest = (np.stack(each) for each in zip(*lags, strict=True))
-    sides = _SIDES[:, None]
-    return Vehicle(twist * _SIDES, lag * sides[:, None], rest * sides, np.zeros_like(rest))
+    return Vehicle(mirrored(twist), mirrored(lag), mirrored(rest), np.zeros_like(rest))
 
 
 @dataclass(frozen=True)
@@ -193,15 +192,13 @@ class Moments:
     @classmethod
     def of(cls, swim: MeasuredSwim, time: Floats) -> Moments:
         """Find times (n,) in a swim; before its start the robot is at rest."""
-        dwells = np.diff(swim.flips)
-        dwell = np.clip(np.searchsorted(swim.flips, time, side="right") - 1, 0, len(dwells) - 1)
-        return cls(dwell, np.maximum(time - swim.flips[dwell], 0.0), dwells, swim.first_direction)
+        dwell = np.clip(np.searchsorted(swim.flips, time, side="right") - 1, 0, len(swim.dwells) - 1)
+        return cls(dwell, np.maximum(time - swim.flips[dwell], 0.0), swim.dwells, swim.first_direction)
 
     @classmethod
     def whole(cls, swim: MeasuredSwim) -> Moments:
         """Take the ends of all dwells."""
-        dwells = np.diff(swim.flips)
-        return cls(np.arange(len(dwells)), dwells, dwells, swim.first_direction)
+        return cls(np.arange(len(swim.dwells)), swim.dwells, swim.dwells, swim.first_direction)
 
     @cached_property
     def forward(self) -> Flags:
@@ -254,10 +251,11 @@ class Base:
         return np.stack([np.interp(place, self.place, column) for column in self.rest.T], -1)
 
 
-def course(changes: Floats, ends: Floats, at: Moments) -> tuple[Floats, Floats]:
+def course(vehicle: Vehicle, changes: Floats, ends: Floats, at: Moments) -> tuple[Floats, Floats]:
     """Chain the changes of the pose in dwells.
 
     Args:
+        vehicle: of the robot.
         changes: of n poses since the flip before, (n, 3).
         ends: of whole dwells, (M, 3).
         at: where the poses are.
@@ -265,7 +263,5 @@ def course(changes: Floats, ends: Floats, at: Moments) -> tuple[Floats, Floats]:
     Returns:
         The poses (n, 3), and those at the starts of the dwells (M, 3), seen from the start of the swim.
     """
-    heading = np.cumsum(ends[:, 2])
-    moves = planar.turn(ends[:, :2], heading - ends[:, 2])
-    flips = np.concatenate([np.zeros((1, 3)), np.column_stack([np.cumsum(moves, 0), heading])])[:-1]
+    flips = chained(vehicle, np.zeros(3), ends, at.dwells)[:-1]
     return planar.compose(flips[at.dwell], changes), flips

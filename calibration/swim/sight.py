@@ -103,7 +103,7 @@ class Sight:
                 ends = ends + self.bases[place].at(whole.place)
             for each in (changes, ends):
                 each[:, :2] *= robot.length
-            poses, flips = course(changes, ends, moments)
+            poses, flips = course(robot.vehicle, changes, ends, moments)
             for part in (2 * place, 2 * place + 1):
                 rows, first = runs.part[own] == part, first_of_last(swim) * (part % 2)
                 start = np.array([value[f"{number}: {runs.part_names[part]}"] for number in STARTS])

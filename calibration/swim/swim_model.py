@@ -87,7 +87,7 @@ class SwimModel:
 
     def swimming(self, sets: Sequence[Parameters]) -> list[Swimming]:
         """Make the robots of P parameter sets."""
-        inputs, columns, same, _ = self.robot.simulated([self.sight.without(one) for one in sets])
+        inputs, columns, same = self.robot.simulated([self.sight.without(one) for one in sets])
         count_predictions(len(columns["N"]))
         length, time = (np.broadcast_to(x, same.shape)[:, 0] for x in (inputs.view.length, inputs.view.time))
         return self.near.swimming(columns, same, time, length)

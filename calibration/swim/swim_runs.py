@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
+from calibration.swim.course import Moments
 from calibration.swim.measured_swim import MeasuredSwim
 from calibration.swim.pose_noise import PoseNoise, Sizes
 from calibration.table.runs import Runs
@@ -110,13 +110,12 @@ def runs_of_swims(swims: Sequence[MeasuredSwim], length: float) -> tuple[SwimRun
     Returns:
         The runs, and the poses (n,) that are held out; to the first of these their start is fitted.
     """
-    time, part, held_out, heads, block, names = [], [], [], [], [], []
+    part, held_out, heads, block, names = [], [], [], [], []
     for place, swim in enumerate(swims):
         cut = swim.flips[first_of_last(swim)]
         late = swim.time >= cut
         first = np.flatnonzero(late)[: max(int(_HEAD * late.sum()), 3)]
         head = np.isin(np.arange(len(late)), first)
-        time.append(swim.time)
         part.append(2 * place + late)
         held_out.append(late)
         heads.append(head)
@@ -126,8 +125,8 @@ def runs_of_swims(swims: Sequence[MeasuredSwim], length: float) -> tuple[SwimRun
     poses = np.concatenate([swim.poses for swim in swims]) / [length, length, 1.0]
     count, numbers = len(poses), [len(swim.time) for swim in swims]
     moment = np.concatenate([swim.time - swim.flips[0] for swim in swims])
-    direction = np.concatenate([_direction(swim) for swim in swims])
-    inputs = np.column_stack([moment, direction, np.cos(poses[:, 2]), np.sin(poses[:, 2])])
+    forward = np.concatenate([Moments.of(swim, swim.time).forward for swim in swims])
+    inputs = np.column_stack([moment, np.where(forward, 1.0, -1.0), np.cos(poses[:, 2]), np.sin(poses[:, 2])])
     scales = {"x": (100 * length, "cm"), "y": (100 * length, "cm"), "heading": (np.degrees(1.0), "°")}
     runs = SwimRuns(
         outputs=OUTPUTS, y=poses, condition=np.arange(count), session=np.repeat(np.arange(len(swims)), numbers),
@@ -142,9 +141,4 @@ def runs_of_swims(swims: Sequence[MeasuredSwim], length: float) -> tuple[SwimRun
 
 def first_of_last(swim: MeasuredSwim) -> int:
     """Return the dwell with which the last part of a swim begins."""
-    return round((1 - _HELD_OUT) * (len(swim.flips) - 1))
-
-
-def _direction(swim: MeasuredSwim) -> Any:
-    dwell = np.searchsorted(swim.flips, swim.time, side="right") - 1
-    return swim.first_direction * (1 - 2 * (dwell % 2))
+    return round((1 - _HELD_OUT) * len(swim.dwells))

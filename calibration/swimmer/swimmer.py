@@ -80,7 +80,6 @@ class Simulated(NamedTuple):
     inputs: Inputs
     columns: dict[str, Floats]  # of the distinct robots, for the simulator
     same: Integers  # (P, n) the robot of each run
-    direction: Floats  # (P, n) of the motor that is simulated: 1, unless left and right turns differ
 
 
 class Solver(NamedTuple):
@@ -152,7 +151,7 @@ class SwimmerModel:
         With `lookup` the look-up table is used, not the simulator. That is good for a first guess only, because
         the errors of the table would look like physics.
         """
-        inputs, distinct, same, _ = self.simulated(sets)
+        inputs, distinct, same = self.simulated(sets)
         if lookup is not None:
             found: Mapping[str, Floats] = lookup.query(distinct)
         else:
@@ -167,9 +166,8 @@ class SwimmerModel:
         """Choose the robots that are simulated for P parameter sets."""
         inputs = self.inputs_of_runs(sets)
         columns = inputs.columns
-        direction = self._direction(columns)
-        columns["omega_bar"] = columns["omega_bar"] * direction
-        return Simulated(inputs, *self._simulated(columns), direction)
+        columns["omega_bar"] = columns["omega_bar"] * self._direction(columns)
+        return Simulated(inputs, *self._simulated(columns))
 
     def linearised(
         self, at: Parameters, along: Sequence[Parameter], *, title: str = "", quick: bool = False

@@ -196,7 +196,7 @@ def roll_out(vehicle: Vehicle, switches: Switches, offset: float = 0.0, *, sampl
     """Predict poses on a schedule, and the track of the point that is `offset` ahead of the head's centre."""
     times = switches.dwells[:, None] * np.arange(1, samples + 1) / samples
     changes = _pose_changes(vehicle, switches.first_direction, None, switches.dwells, times)
-    flips = _chained(vehicle, switches.poses[0], changes[:, -1], switches.dwells)
+    flips = chained(vehicle, switches.poses[0], changes[:, -1], switches.dwells)
     within = planar.compose(flips[:-1, None], changes)
     within[..., :2] += vehicle.current * times[..., None]
     poses = np.concatenate([flips[:1], within.reshape(-1, 3)])
@@ -217,7 +217,7 @@ def flips_after(vehicle: Vehicle, switches: Switches, kept: int, last: Floats) -
     """Predict the poses (B, K, 3) at the flips where dwells (B, K) follow the first `kept` ones of a schedule."""
     sense, before = switches.first_direction * (-1) ** kept, switches.dwells[kept - 1] if kept else None
     changes = _pose_changes(vehicle, sense, before, last, last[..., None])[..., 0, :]
-    return _chained(vehicle, switches.poses[kept], changes, last)[:, 1:]
+    return chained(vehicle, switches.poses[kept], changes, last)[:, 1:]
 
 
 def _pose_changes(vehicle: Vehicle, sense: int, before: float | None, dwells: Floats, times: Floats) -> Floats:
@@ -240,7 +240,7 @@ def _pose_changes(vehicle: Vehicle, sense: int, before: float | None, dwells: Fl
     return changes
 
 
-def _chained(vehicle: Vehicle, start: Floats, changes: Floats, dwells: Floats) -> Floats:
+def chained(vehicle: Vehicle, start: Floats, changes: Floats, dwells: Floats) -> Floats:
     """Compose poses (..., M + 1, 3) from a start and the pose changes (..., M, 3) of dwells (..., M)."""
     heading = start[2] + np.cumsum(changes[..., 2], -1)
     moves = planar.turn(changes[..., :2], heading - changes[..., 2]) + vehicle.current * dwells[..., None]
