@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from calibration.swim.measured_swim import MeasuredSwim, is_track, read_swims
+from camera.pose_tracks import read_tracks
 from common.errors import InputError
 from planner.files.plan_files import write_plan
 from sim.motion.replay import replay
@@ -20,7 +21,8 @@ from tracking.swim import swim
 
 
 def read(table: pd.DataFrame | str | Path, plan: Any = None) -> MeasuredSwim:
-    (swum,) = read_swims(table, plan)
+    file = None if isinstance(table, pd.DataFrame) else table
+    (swum,) = read_swims(read_tracks(table), plan, file=file)
     assert (np.diff(swum.time) > 0).all()
     assert len(swum.time) == len(swum.poses) >= 60
     assert (swum.time >= swum.flips[0]).all()
@@ -216,7 +218,7 @@ def test_bad_tables_are_refused_in_one_line(tmp_path: Path) -> None:
         file = tmp_path / "track.csv"
         table.to_csv(file, index=False)
         with pytest.raises(InputError) as caught:
-            read_swims(file)
+            read_swims(read_tracks(file), file=file)
         assert str(caught.value).startswith(str(file))
         return str(caught.value).removeprefix(f"{file}: ")
 
@@ -298,7 +300,7 @@ def test_tracks_of_other_programs_need_the_plan(tmp_path: Path) -> None:
     half, zero = poses[:, 2] / 2, np.zeros(len(table))
     columns = [table["time_s"].to_numpy(), poses[:, 0], poses[:, 1], zero, zero, zero, np.sin(half), np.cos(half)]
     np.savetxt(tmp_path / "track.tum", np.stack(columns, 1))
-    assert is_track(tmp_path / "track.tum")
+    assert is_track(read_tracks(tmp_path / "track.tum"))
     assert_true(read(tmp_path / "track.tum", PLAN))
     both = pd.concat([table.assign(run=1), table.assign(run=2)])
     both.attrs["lost"] = ["2 poses are lost"]
