@@ -10,7 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calibration.statistics.study import quarter_of_conditions
 from calibration.swim.measured_swim import MeasuredSwim, is_track, read_swims
+from calibration.swim.swim_runs import runs_of_swims
+from calibration.table.excluded import summary_of_excluded
 from camera.pose_tracks import read_tracks
 from common.errors import InputError
 from planner.files.plan_files import write_plan
@@ -305,6 +308,15 @@ def test_tracks_of_other_programs_need_the_plan(tmp_path: Path) -> None:
     both = pd.concat([table.assign(run=1), table.assign(run=2)])
     both.attrs["lost"] = ["2 poses are lost"]
     assert [each.said for each in read_swims(both)] == [("2 poses are lost",), ()]
+
+
+def test_what_is_said_of_a_track_is_kept_with_its_poses() -> None:
+    table = track()
+    table.loc[100:104, ["x_cm", "y_cm", "heading_deg"]] = np.nan
+    runs, held_out = runs_of_swims([read(table)], 0.1)
+    assert runs.row == "pose"
+    assert summary_of_excluded(runs.excluded, len(runs)) == [f"swim: 5 of {len(table)} rows have no pose"]
+    assert quarter_of_conditions(runs, ~held_out)[1] == "a quarter of the stretches"
 
 
 def test_a_track_is_told_from_a_table_of_runs() -> None:
