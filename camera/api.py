@@ -9,10 +9,10 @@ from typing import Unpack
 import pandas as pd
 
 from camera.measured_runs import measure_tracks
-from camera.track_options import TrackOptions
 from common.errors import InputWarning
 from common.files import whole_file
 from common.keywords import checks_keywords
+from common.track_options import TrackOptions
 from sim.robot_rows import OneRobot, one_robot, with_units
 
 

@@ -24,12 +24,12 @@ from camera.circle import TrackedRun, TrackFit, fit_track
 from camera.gaps import seen_poses
 from camera.pose_tracks import read_tracks, run_names
 from camera.spin import fit_spin
-from camera.track_options import TrackOptions
 from common.arrays import Floats
 from common.errors import InputError, naming
 from common.quantities import convert_columns, numbers_of
 from common.run_columns import MEASURED, RUN, RUN_SYNONYMS, check_factor
 from common.tables import read_table, row_name
+from common.track_options import TrackOptions
 from sim.inputs import run_columns
 from sim.model.robot import Robot
 from sim.motion.batches import steady_columns
@@ -88,11 +88,8 @@ def measure_tracks(
         InputError: a column is missing, headings are in radians, all runs turn to the wrong side, no track gives
             a number, or all are far from what the robot does.
     """
-    samples, where = (
-        (tracks, "the tracks")
-        if isinstance(tracks, pd.DataFrame)
-        else (read_tracks(tracks, **options), str(tracks))
-    )
+    samples = read_tracks(tracks, **options)
+    where = "the tracks" if isinstance(tracks, pd.DataFrame) else str(tracks)
     lost = samples.attrs.get("lost", [])
     table, place = (runs, "the runs") if isinstance(runs, pd.DataFrame) else (read_table(runs), str(runs))
     samples, converted = convert_columns(samples, COLUMNS, where, _SYNONYMS)

@@ -20,17 +20,17 @@ from typing import Unpack
 import numpy as np
 import pandas as pd
 
-from camera.track_options import TrackOptions
 from camera.tracking_programs import PROGRAMS, TrackedPoints, TrackingProgram
 from common.errors import InputError, naming
 from common.reading import read_bytes
 from common.tables import read_table
+from common.track_options import TrackOptions
 from common.units import number_and_unit, of_kind, to_si
 
 _LISTED, _HEAD = 8, 400  # names in a message; bytes that tell which program wrote a file
 
 
-def read_tracks(path: str | Path, **options: Unpack[TrackOptions]) -> pd.DataFrame:
+def read_tracks(source: str | Path | pd.DataFrame, **options: Unpack[TrackOptions]) -> pd.DataFrame:
     """Read tracks that the program `written_by` has written; without it a table, which is returned as it is.
 
     A run is named as its file, without what DeepLabCut adds from "DLC" on. Where a file has several robots, each
@@ -39,8 +39,13 @@ def read_tracks(path: str | Path, **options: Unpack[TrackOptions]) -> pd.DataFra
     Raises:
         InputError: the file is not as the program writes it, or an option is missing, or has no meaning for it.
     """
-    path, source = Path(path), options.get("written_by")
-    if source is None:
+    name = options.get("written_by")
+    if isinstance(source, pd.DataFrame):
+        if given := sorted(each for each, value in options.items() if value is not None):
+            raise InputError(f"{given[0]} is for the file of another program, not for a DataFrame; leave it out")
+        return source
+    path = Path(source)
+    if name is None:
         if others := options.keys() - {"written_by"}:
             raise InputError(f"--{min(others)} is for tracks of another program; say which with --from")
         start = read_bytes(path, first=_HEAD).decode("latin-1").removeprefix("ï»¿") if path.is_file() else ""
@@ -50,10 +55,10 @@ def read_tracks(path: str | Path, **options: Unpack[TrackOptions]) -> pd.DataFra
         if wrote != ["tum"]:  # which needs no options
             asked = f"say what wrote it: --from {' or '.join(wrote)}{_also_missing(path, wrote)}"
             raise InputError(f"{path} is no table of poses; {asked}")
-        source = "tum"
-    if source not in PROGRAMS:
-        raise InputError(f"no program {source!r}; there are {', '.join(PROGRAMS)}")
-    program, runs = PROGRAMS[source], []
+        name = "tum"
+    if name not in PROGRAMS:
+        raise InputError(f"no program {name!r}; there are {', '.join(PROGRAMS)}")
+    program, runs = PROGRAMS[name], []
     for file in _films(path, program) if path.is_dir() else [path]:
         try:
             with warnings.catch_warnings(), naming(file):

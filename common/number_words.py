@@ -121,15 +121,11 @@ def plain_numbers(lines: Sequence[str], separator: str, width: int) -> list[np.n
         return None
     if values.shape != (len(rows), width):
         return None
-    return [_whole(column, rows, separator, k) for k, column in enumerate(values.T)]
-
-
-def _whole(values: np.ndarray, rows: Sequence[str], separator: str, index: int) -> np.ndarray:
-    """Convert a column to integers if they are written so."""
-    if np.abs(values).max() >= 2.0**53 or np.any(values % 1):
-        return values
-    written = "".join(row.split(separator, index + 1)[index] for row in rows)
-    return values if set(written) & set(".eE") else values.astype(np.int64)
+    whole = ((np.abs(values) < 2.0**53) & (values == np.trunc(values))).all(0)
+    written = np.frombuffer(text.encode(), np.uint8)
+    ends, marks = (np.flatnonzero(np.isin(written, [*signs])) for signs in (f"{separator}\n".encode(), b".eE"))
+    whole[np.searchsorted(ends, marks) % width] = False  # 2.0 is no integer
+    return [column.astype(np.int64) if whole[k] else column for k, column in enumerate(values.T)]
 
 
 def _float(word: str) -> float:

@@ -3,6 +3,7 @@
 The text of a camera, a spreadsheet or an oscilloscope does not say how it is written. Its first lines show it:
 
 - Encoding: UTF-8, UTF-16 with a byte order mark, otherwise Windows-1252, which contains the letters of Latin-1.
+  Further byte order marks, as joined files have them, are left out.
 - Lines above the names that begin with # or % are comments. So are those between the names and the first row,
   unless a number follows the mark or the first cell is a missing value (#N/A). If the columns have no names, and
   the last comment above them has as many words as there are columns, these are the names (as `numpy.savetxt`
@@ -95,7 +96,8 @@ def parse_table(data: bytes, where: str, *, names: bool = True) -> pd.DataFrame:
         text = data.decode("cp1252", errors="replace").replace("\ufffd", "\0")
     if "\0" in text:
         raise InputError(f"{where} is no text; give a table as text, .xlsx or .parquet")
-    return _parse_lines(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), where, names)
+    text = text.replace("\ufeff", "").replace("\r\n", "\n").replace("\r", "\n")
+    return _parse_lines(text.split("\n"), where, names)
 
 
 def row_name(table: pd.DataFrame, row: int) -> str:
@@ -227,7 +229,9 @@ def _parse_lines(lines: Sequence[str], where: str, names: bool, separator: str =
 def _header(lines: Sequence[str], top: int, separator: str, where: str) -> tuple[list[str] | None, Iterator[Row]]:
     """Return the names of the columns, if there are any, and the rows below them."""
     rows = _rows(lines, top, separator, where)
-    first = next(rows)
+    first = next(rows, None)
+    if first is None:  # quotes without a text, or separators
+        raise InputError(f"{where} is empty; give a table with one row per line")
     words = first[1]
     numbers = any(map(is_number, words))
     names = _commented_names(lines[:top], len(words), separator)
@@ -309,7 +313,7 @@ def _separator(lines: Sequence[str], where: str) -> str:
     counts = {}
     for mark in _SEPARATORS:
         try:
-            counts[mark] = [len(words) for _, words in islice(_rows(lines, 0, mark, where), 2)]
+            counts[mark] = [len(words) for _, words in islice(_rows(lines, 0, mark, where), 2)] or [0]
         except InputError:  # quotes that end within a cell: another separator
             continue
         if counts[mark][0] > 1 and counts[mark][0] == counts[mark][-1] and len(counts[mark]) == 2:

@@ -53,7 +53,9 @@ def _demo(*, out: str = "reports/demo.html") -> None:
     run_demo(out)
 
 
-@program.command("calibrate", of="softflagella.closed_loop:calibrate", paths="path", progress="")
+@program.command(
+    "calibrate", of="softflagella.closed_loop:calibrate", paths="path", progress="", written_by="from"
+)
 def _calibrate(
     calibrate: Call,
     table: str = "",
@@ -66,10 +68,10 @@ def _calibrate(
     paths: Sequence[str] | None = None,
     no_path: bool = False,
 ) -> None:
-    """Fit a table, find what the model lacks, correct the robot.
+    """Fit a table or a track, find what the model lacks, correct the robot.
 
     Args:
-        table: CSV or Parquet of measured runs; or --films and --view.
+        table: CSV or Parquet of measured runs, or the track of a swim; or --films and --view.
         robot: robot.toml or the name of a preset; or --model.
         model: PY, a file with a model of your own (softflagella model writes one).
         films: TABLE, of runs with their films, in a column film; the measured table goes into the folder.

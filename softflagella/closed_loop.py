@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import partial
 from numbers import Integral, Real
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Unpack
 
 import pandas as pd
 
@@ -21,6 +21,7 @@ from calibration.table.runs import lines_of_excluded
 from calibration.verdict.calibrate import calibrate as find_what_is_missing
 from common.errors import InputError
 from common.keywords import checks_keywords
+from common.track_options import TrackOptions
 from common.units import LengthUnit
 
 if TYPE_CHECKING:
@@ -55,11 +56,12 @@ def calibrate(
     jobs: int | None = None,
     progress: bool = True,
     tell: Callable[[str], object] = lambda line: None,
+    **options: Unpack[TrackOptions],
 ) -> RobotVerdict | ModelVerdict:
     """Fit measured runs, or a swim, find what the model lacks, and correct the robot, or a model of your own.
 
-    `protocol`, `laws`, `paths`, `unit` and `plan` are for a robot; `session`, `specimen`, `trace`, `held_out`,
-    `noise` and `notes` are for a model of your own.
+    `protocol`, `laws`, `paths`, `unit`, `plan` and `options` are for a robot; `session`, `specimen`, `trace`,
+    `held_out`, `noise` and `notes` are for a model of your own.
 
     Args:
         table: measured runs, one row for each run, or their file: `N`, `l_cm`, `omega_rpm` and two or more
@@ -98,6 +100,7 @@ def calibrate(
         jobs: threads; default all processors.
         progress: show progress bars.
         tell: is told, before the fit, what was converted and what was excluded, a line at a time.
+        options: of a track that another program has written, see `TrackOptions`.
 
     Returns:
         The verdict, with `verdict` ("none", "number", "effect", "ambiguous", "partial", "unexplained"),
@@ -125,7 +128,7 @@ def calibrate(
     roles = Roles(session, specimen, held_out, noise, notes, trace)
     if isinstance(robot, Model):
         _refuse("a model of your own", laws=not laws, paths=paths, unit=unit, plan=plan,
-                protocol=protocol != "session")  # fmt: skip
+                protocol=protocol != "session", **options)  # fmt: skip
         with limited(limit):
             experiment, rows = read_runs_of(table, robot, roles, own=settings, title="checks" if progress else "")
             for line in (*experiment.runs.converted, *lines_of_excluded(experiment.runs)):
@@ -153,6 +156,7 @@ def calibrate(
         jobs=jobs,
         progress=progress,
         tell=tell,
+        options=options,
     )
 
 

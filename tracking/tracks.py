@@ -19,11 +19,11 @@ import pandas as pd
 
 from camera.gaps import seen_poses
 from camera.pose_tracks import read_tracks
-from camera.track_options import TrackOptions
 from common.arrays import Floats
 from common.errors import InputError, InputWarning, naming
 from common.keywords import checks_keywords
 from common.quantities import convert_columns, numbers_of
+from common.track_options import TrackOptions
 from common.units import format_length, length_in_lab
 from planner.files.saved_plan import load_plan
 from planner.paths.distance import distance_to, farthest
@@ -173,8 +173,8 @@ def read_track(track: pd.DataFrame | str | Path, **options: Unpack[TrackOptions]
     Raises:
         InputError: the file cannot be read, or has the tracks of several robots.
     """
-    table = track if isinstance(track, pd.DataFrame) else read_tracks(track, **options)
-    if options and len(runs := table["run"].unique()) > 1:
+    table = read_tracks(track, **options)
+    if options.get("written_by") and len(runs := table["run"].unique()) > 1:
         raise InputError(f"there are {len(runs)} tracks, of {runs[0]}, {runs[1]} …; give that of one robot")
     for line in table.attrs.get("lost", ()):
         warnings.warn(line, InputWarning, stacklevel=4)
@@ -256,7 +256,9 @@ def require_lab(track: pd.DataFrame) -> None:
 def what_next(
     plan: Mapping[str, Any], track: str, plan_file: str | None = None, options: Mapping[str, Any] = _NONE
 ) -> str:
-    """Say how a track tells what the model lacks: one line, empty for a measured vehicle, which has no model.
+    """Write the command that finds in a track what the model lacks: one line.
+
+    It is empty for a measured vehicle, which has no model.
 
     Args:
         plan: content of plan.json.
@@ -275,7 +277,7 @@ def what_next(
         if (value := options.get(name)) is not None:
             words.append("--from" if name == "written_by" else f"--{name}")
             words += [f"{number:g}" for number in value] if name == "origin" else [str(value)]
-    return f"find out what the model lacks: softflagella calibrate {shlex.join(words)}"
+    return f"find out what the model lacks: softflagella calibrate {shlex.join([*words, '--out', 'calibrated'])}"
 
 
 def draw_overlay(axes: Axes, plan: Mapping[str, Any], error: TrackingError, title: str) -> None:

@@ -50,13 +50,13 @@ class Reason(StrEnum):
 
     KEPT = "kept"
     NOT_NEEDED = "not needed"
-    NO_CHANGE = "it changes nothing in these runs"
-    ABSORBED = "the coefficients absorb it: not testable with these runs"
+    NO_CHANGE = "it changes nothing in these data"
+    ABSORBED = "the coefficients absorb it: not testable with these data"
     NOISE = "score within the noise"
     WRONG_SIGN = "its score has a sign that the effect cannot have"
     LEAVES_MUCH = "leaves far more than noise, by its score"
     NO_TIME = "no time was left for its fit"
-    NOT_SOLVED = "with it the model of some runs is not solved directly"
+    NOT_SOLVED = "with it the model is not solved directly everywhere"
     NOT_CONVERGED = "its fit did not converge"
     LEAVES_RESIDUAL = "leaves a residual"
     INCLUDES_NULL = "its interval includes the null"
@@ -72,9 +72,9 @@ class Reason(StrEnum):
     NOT_CREDIBLE = "no such number is off by so much"
     ONE_OF_MANY = "chosen among many pairs, whose shapes lie densely"
     IMITABLE = "something outside the catalogue could imitate it"
-    DOES_NOT_TRANSFER = "its size does not carry over to other runs"
+    DOES_NOT_TRANSFER = "its size does not carry over to other data"
     IMPLAUSIBLE = "off by more of its tolerances than an error of measurement makes credible"
-    REFUTED = "runs that it was not fitted to refute it"
+    REFUTED = "data that it was not fitted to refute it"
 
 
 @dataclass(frozen=True)

@@ -48,16 +48,17 @@ _FEWEST = 6  # runs in a group, and outside it
 def groups_that_may_differ(runs: Runs) -> list[tuple[str, Flags]]:
     """List groups of runs with partners outside them, with words for each."""
     names, session = runs.session_names, runs.session
+    kind = "swim" if runs.row == "pose" else "session"
     candidates: list[tuple[str, Flags]] = []
     if runs.specimen is not None:
         candidates += [(f"on specimen {name}", runs.specimen == i) for i, name in enumerate(runs.specimen_names)]
     present = np.unique(session).tolist()  # a part of the runs may have none of a session
     if runs.traces_are_sessions:  # a trace may have numbers of its own
         present = []
-    candidates += [(f"in session {names[i]}", session == i) for i in present]
+    candidates += [(f"in {kind} {names[i]}", session == i) for i in present]
     by_time = sorted(present, key=lambda i: int(runs.rows[session == i].min()))
     candidates += [
-        (f"since session {names[by_time[k]]}", np.isin(session, by_time[k:])) for k in range(2, len(present) - 1)
+        (f"since {kind} {names[by_time[k]]}", np.isin(session, by_time[k:])) for k in range(2, len(present) - 1)
     ]
     distinct: list[tuple[str, Flags]] = []
     settings = np.unique(runs.partners.round(9), axis=0, return_inverse=True)[1].reshape(-1)

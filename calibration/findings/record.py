@@ -135,6 +135,7 @@ def _fitted(result: Findings) -> dict[str, Any]:
         },
         "least_determined": _least_determined(final),
         "subject": result.runs.subject,
+        "row": result.runs.row,
     }
 
 
@@ -233,7 +234,7 @@ def _withdrawn(claim: Hypothesis) -> dict[str, Any]:
     }
 
 
-def _move(move: Hypothesis) -> dict[str, Any]:
+def _move(move: Hypothesis, runs: Runs) -> dict[str, Any]:
     shift, name = shift_of(move), move.effect.name
     record = {
         "number": shift.parameter.name,
@@ -246,7 +247,7 @@ def _move(move: Hypothesis) -> dict[str, Any]:
     }
     number = shift.parameter
     return {
-        "words": move_in_words(record, move.effect.title, number.shown, number.unit),
+        "words": move_in_words(record, move.effect.title, number.shown, number.unit, runs.row),
         **record,
     }
 
@@ -276,7 +277,7 @@ def _numbers(result: Findings) -> dict[str, Any]:
         "notable_number": learnt[0].words if notable else None,
         "numbers_as_given": [_number(p) for p in pulls],
         "differences": [_difference(d, result.runs) for d in result.differences],
-        "moves": [_move(move) for move in result.moves],
+        "moves": [_move(move, result.runs) for move in result.moves],
     }
 
 

@@ -64,11 +64,11 @@ Drawn = tuple[Figure, str, str]  # with a description and a caption
 
 def draw_all(result: Findings) -> dict[str, list[Drawn]]:
     """Draw the figures of a report, by their names in the template; one that fails is left out with a warning."""
-    kind, adopted, law = result.runs.drawn[1][0], result.nearest, result.law
+    kind, adopted, law, row = result.runs.drawn[1][0], result.nearest, result.law, result.runs.row
     carried_out = [error for error in result.paths if error.carried_out]
     figures: dict[str, Callable[[], list[Drawn]]] = {
         "summary": lambda: [(draw_summary(result), "residual of each output over the noise, for each model",
-                             "The same on the runs that were fitted, for each output.")],
+                             f"The same on the {row}s that were fitted, for each output.")],
     }  # fmt: skip
     if result.runs.trace is not None:
         figures["curves"] = lambda: [(figure, f"{output} of held-out traces against time, and residuals", _CURVES)
@@ -80,7 +80,7 @@ def draw_all(result: Findings) -> dict[str, list[Drawn]]:
         figures["track"] = lambda: [
             (draw_track(result), "the track in the plane, measured and by each model", _TRACK)
         ]
-    figures["maps"] = lambda: [(figure, f"map of the residual over the runs' inputs, {model}", model)
+    figures["maps"] = lambda: [(figure, f"map of the residual over the inputs of the {row}s, {model}", model)
                                for figure, model in draw_maps(result)]  # fmt: skip
     if result.attribution.misfit.critical_z > 0:  # else no effect can be told from the numbers
         words = "score of each effect against what a claim needs"
@@ -152,16 +152,16 @@ def plot_summary(axes: Axes, result: Findings) -> None:
         axes.barh(
             place + height * ((len(models) - 1) / 2 - i), rms, height=0.9 * height, color=colour, label=label
         )
-    axes.axvline(1.0, color=INK, lw=1.4, label="noise of a run")
+    axes.axvline(1.0, color=INK, lw=1.4, label=f"noise of a {data.row}")
     axes.set_yticks(place, [data.title_of(o) for o in data.outputs], fontsize=9)
-    axes.set_xlabel("measured − model, rms, over the noise of a run", fontsize=9)
+    axes.set_xlabel(f"measured − model, rms, over the noise of a {data.row}", fontsize=9)
     axes.tick_params(axis="x", labelsize=8)
 
 
 def draw_residuals(result: Findings) -> list[tuple[Figure, str]]:
     """Draw measured minus model against a setting, a figure for each model; return each with its model."""
     data, used = result.runs, result.split.fitted
-    residuals = {label: (data.y - prediction)[used] for label, prediction in compared(result)}
+    residuals = {label: data.raw(data.y - prediction)[used] for label, prediction in compared(result)}
     limits = 1.1 * np.max([np.abs(residual).max(0) for residual in residuals.values()], 0)
     limits = np.where(limits > 0, limits, 1.0)  # also where no run departs
     return [(_draw_residual(residual, limits, used, data), label) for label, residual in residuals.items()]

@@ -69,10 +69,18 @@ class RobotVerdict(Verdict):
 
 
 def read_runs(
-    table: str | Path | pd.DataFrame, protocol: Literal["session", "paper"], tell: Callable[[str], object]
+    table: pd.DataFrame,
+    protocol: Literal["session", "paper"],
+    tell: Callable[[str], object],
+    *,
+    file: str | Path | None = None,
 ) -> tuple[Measurements, Flags | None]:
-    """Read the runs of a table, and those that its protocol holds out; see `softflagella.calibrate`."""
-    data = read_measurements(table)
+    """Read the runs of a table, and those that its protocol holds out; see `softflagella.calibrate`.
+
+    Args:
+        file: from which the table was read.
+    """
+    data = read_measurements(table, file=file)
     for line in (*data.converted, *lines_of_excluded(data)):
         tell(line)
     return PROTOCOLS[protocol](data)

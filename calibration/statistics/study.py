@@ -277,7 +277,8 @@ def quarter_of_conditions(data: Runs, used: Flags) -> tuple[Flags, str]:
     if data.specimen is not None and len(kinds := np.unique(data.specimen[used])) >= _FEWEST_OF_A_QUARTER:
         chosen = rng.permutation(kinds)[: len(kinds) // 4]
         return data.left_out(used & np.isin(data.specimen, chosen)), "a quarter of the specimens"
-    condition, inputs, what = data.together, data.inputs, "conditions"
+    condition, inputs = data.together, data.inputs
+    what = "conditions" if data.parts is None else "stretches"
     if data.trace is not None:  # whole traces
         inputs, what = data.partners, "traces"
         condition = np.unique(inputs.round(9), axis=0, return_inverse=True)[1].reshape(-1)

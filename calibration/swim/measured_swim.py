@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -19,8 +19,7 @@ import pandas as pd
 from calibration.swim.flips import as_planned, motor_by_plan, motor_by_rows
 from calibration.swim.seen import continuous, outliers, told
 from camera.gaps import seen_poses
-from camera.pose_tracks import read_tracks, run_names
-from camera.track_options import TrackOptions
+from camera.pose_tracks import run_names
 from common.arrays import Floats
 from common.errors import InputError, naming
 from common.quantities import numbers_of
@@ -58,16 +57,14 @@ class MeasuredSwim:
 
 
 def read_swims(
-    source: str | Path | pd.DataFrame,
-    plan: PlanSource | None = None,
-    **options: Unpack[TrackOptions],
+    track: pd.DataFrame, plan: PlanSource | None = None, *, file: str | Path | None = None
 ) -> list[MeasuredSwim]:
     """Read the swims of a track, one for each `run`.
 
     Args:
-        source: table of poses, see above, or what another program has written.
+        track: table of poses, see above.
         plan: that was carried out: plan.json, its content, or a plan. Needed where a track has no `direction`.
-        options: of a file that another program has written, see `TrackOptions`.
+        file: from which the track was read, for messages and for the name of its swim.
 
     Raises:
         InputError: a column is missing, a value is no finite number, time goes back, the track is that of another
@@ -75,15 +72,14 @@ def read_swims(
     """
     content = load_plan(plan) if isinstance(plan, str | Path) else plan
     content = content.to_dict() if isinstance(content, Plan) else content
-    with naming(source):
-        read = source if isinstance(source, pd.DataFrame) else read_tracks(source, **options)
-        table, lost = in_lab(read), tuple(read.attrs.get("lost", ()))
+    with naming(file):
+        table, lost = in_lab(track), tuple(track.attrs.get("lost", ()))
         require_lab(table)
         if content is not None:
             check_plan_id(content, table)
-        share = 0.0 if set(read) >= _SIMULATED else 1.0 if _ANSWERED in read else 0.5
+        share = 0.0 if set(track) >= _SIMULATED else 1.0 if _ANSWERED in track else 0.5
         values = _values(table, [*LAB, *(name for name in ("direction",) if name in table)])
-        name = "swim" if isinstance(source, pd.DataFrame) else Path(source).stem
+        name = "swim" if file is None else Path(file).stem
         runs = run_names(table["run"]) if "run" in table else pd.Series(name, table.index)
         swims: list[MeasuredSwim] = []
         for run in (names := runs.unique()):
@@ -97,13 +93,8 @@ def read_swims(
     return swims
 
 
-def is_track(source: str | Path | pd.DataFrame) -> bool:
-    """Tell whether a table has poses, and is none of runs of steady motion.
-
-    Raises:
-        InputError: the file cannot be read, or another program has written it, which `read_swims` must be told.
-    """
-    table = source if isinstance(source, pd.DataFrame) else read_tracks(source)
+def is_track(table: pd.DataFrame) -> bool:
+    """Tell whether a table has poses, and is none of runs of steady motion."""
     quantities = {split(str(name)).quantity.lower() for name in table}
     return {"x", "y", "heading"} <= quantities and "omega_rpm" not in table
 

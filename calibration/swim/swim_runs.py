@@ -15,6 +15,7 @@ import numpy as np
 from calibration.swim.course import Moments
 from calibration.swim.measured_swim import MeasuredSwim
 from calibration.swim.pose_noise import PoseNoise, Sizes
+from calibration.table.excluded import Excluded
 from calibration.table.runs import Runs
 from common.arrays import Flags, Floats, Integers
 
@@ -44,7 +45,7 @@ class SwimRuns(Runs):
     def drawn(self) -> tuple[str, tuple[str, Integers, tuple[str, ...]]]:
         """The time, and the direction of the motor in colour."""
         turning = self.inputs[:, 1] > 0
-        return "time", ("motor", turning.astype(int), ("motor at −1", "motor at +1"))
+        return "time", ("direction of the motor", turning.astype(int), ("motor at −1", "motor at +1"))
 
     def in_noise(self, sizes: Sizes, course: Floats) -> SwimRuns:
         """Return the same poses white in a noise, along a course (n, 3) without it."""
@@ -59,6 +60,10 @@ class SwimRuns(Runs):
     @property
     def subject(self) -> str:
         return "robot"
+
+    @property
+    def row(self) -> str:
+        return "pose"
 
     @property
     def along(self) -> Floats:
@@ -128,11 +133,12 @@ def runs_of_swims(swims: Sequence[MeasuredSwim], length: float) -> tuple[SwimRun
     forward = np.concatenate([Moments.of(swim, swim.time).forward for swim in swims])
     inputs = np.column_stack([moment, np.where(forward, 1.0, -1.0), np.cos(poses[:, 2]), np.sin(poses[:, 2])])
     scales = {"x": (100 * length, "cm"), "y": (100 * length, "cm"), "heading": (np.degrees(1.0), "°")}
+    told = tuple(Excluded(f"{swim.name}: {line}") for swim in swims for line in swim.said)
     runs = SwimRuns(
         outputs=OUTPUTS, y=poses, condition=np.arange(count), session=np.repeat(np.arange(len(swims)), numbers),
         session_names=tuple(swim.name for swim in swims), inputs=inputs,
-        input_names=("time", "direction", "course_x", "course_y"), rows=np.arange(1, count + 1), excluded=(),
-        caveats=(), swims=tuple(swims), part=np.concatenate(part), part_names=tuple(names),
+        input_names=("time", "direction", "course_x", "course_y"), rows=np.arange(1, count + 1),
+        excluded=told, caveats=(), swims=tuple(swims), part=np.concatenate(part), part_names=tuple(names),
         block=np.concatenate(block), poses=poses, length=length, sigma=np.ones(3), heads=np.concatenate(heads),
         output_scales=scales,
     )  # fmt: skip

@@ -135,18 +135,21 @@ class Measurements(Runs):
         return "tail length", ("N", kind.reshape(-1), tuple(f"N = {n:.0f}" for n in tails))
 
 
-def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
+def read_measurements(source: str | Path | pd.DataFrame, *, file: str | Path | None = None) -> Measurements:
     """Read measurements from a file (`common.tables`) or a table.
+
+    Args:
+        file: from which a `source` that is a table was read, for messages.
 
     Raises:
         InputError: columns are missing or misspelt, or too few runs remain.
     """
-    with naming(source):
-        return _read(source)
+    known = source if file is None else file
+    with naming(known):
+        return _read(open_table(source), "the table" if isinstance(known, pd.DataFrame) else str(known))
 
 
-def _read(source: str | Path | pd.DataFrame) -> Measurements:
-    original, where = open_table(source), "the table" if isinstance(source, pd.DataFrame) else str(source)
+def _read(original: pd.DataFrame, where: str) -> Measurements:
     table, converted = convert_measured(original, where)
     unknown = [str(name) for name in table if name not in RUN_COLUMNS]
     blank = table.isna() | table.apply(lambda column: column.astype(str).str.strip() == "")

@@ -255,6 +255,11 @@ class Runs:
         """What the runs are of, in a word: "model", or "robot"."""
         return "model"
 
+    @property
+    def row(self) -> str:
+        """What a row is, in a word: "run", or "pose"."""
+        return "run"
+
     def nearer(self, used: Flags) -> list[Flags]:
         """List sets of runs (n,) among `used` at one end of the settings; a claim must carry over to the rest.
 

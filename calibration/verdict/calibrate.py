@@ -325,7 +325,7 @@ def _caveats(findings: Findings, model: ForwardModel, ended: Mapping[str, str], 
     of_fits = (
         (not runs.noise_known, unknown),
         (beside, f"no law was looked for: laws are not fitted beside {beside}"),
-        (vague, f"these runs determine {' and '.join(vague)} to no better than a factor of two"),
+        (vague, f"these {runs.row}s determine {' and '.join(vague)} to no better than a factor of two"),
         (outside, "without effects the coefficients run to the end of their range, so every effect was refitted "
          "from the model as given, and it is less sure which effect it is"),
         (not final.converged, "the fit did not converge: do not trust its coefficients"),

@@ -117,10 +117,11 @@ def _trace_in_words(record: Record, difference: Record) -> str:
     return f"{words[kind]}{instead}"
 
 
-def move_in_words(move: Record, title: str, shown: float, unit: str) -> str:
+def move_in_words(move: Record, title: str, shown: float, unit: str, row: str) -> str:
     """Say by how much a number differs in some runs, with its 95 % interval; `title` says where, too.
 
     Args:
+        row: what a row is called (`Runs.row`).
         shown: factor to the `unit` in which the number is shown.
     """
     sizes = np.array([move["change"], *move["interval"]])
@@ -128,7 +129,7 @@ def move_in_words(move: Record, title: str, shown: float, unit: str) -> str:
     value, low, high = map(two_digits, (abs(float(sizes[0])), *sorted(np.abs(sizes[1:]).tolist())))
     others = f", or {' or '.join(move['instead'])} differs" if move["instead"] else ""
     side, sigmas = "above" if sizes[0] > 0 else "below", abs(move["score"])
-    return f"{title} is {value} {unit} ({low} to {high}) {side} that of the other runs ({sigmas:.1f} σ){others}"
+    return f"{title} is {value} {unit} ({low} to {high}) {side} that of the other {row}s ({sigmas:.1f} σ){others}"
 
 
 def plain(value: float, digits: int = 3) -> str:
@@ -162,15 +163,16 @@ def interval_in_words(record: Record, interval: Sequence[float]) -> str:
 def gain_in_words(record: Record, before: float, after: float, interval: Sequence[float] | None) -> str:
     """Say whether the error on the held-out runs falls with what is claimed; an interval with zero is no gain."""
     without, with_it = error_in_words(record, before), error_in_words(record, after)
+    rows = f"{record['row']}s"
     if after >= before:
-        return f"the error on the held-out runs does not fall with it ({without} without, {with_it} with it)"
-    falls = f"the error on the held-out runs falls from {without} to {with_it}"
+        return f"the error on the held-out {rows} does not fall with it ({without} without, {with_it} with it)"
+    falls = f"the error on the held-out {rows} falls from {without} to {with_it}"
     if interval is None:
         return falls
     words = interval_in_words(record, interval)
     if interval[0] <= 0:
         return (
-            "there is no gain that these runs can show "
+            f"there is no gain that these {rows} can show "
             f"(error on the held-out ones {without} without, {with_it} with it; gain, {words})"
         )
     return f"{falls} (by {error_in_words(record, before - after)}, {words})"
@@ -191,10 +193,10 @@ def p_in_words(p_value: float, draws: int) -> str:
     return f"p {'≤' if p_value <= _RESOLVED / (draws + 1) else '='} {p_value:.2g}"
 
 
-def given(number: Record) -> str:
+def given(record: Record, number: Record) -> str:
     """Write the value of a nuisance parameter that was given; that of an offset or a scale is in the table."""
     if number["given"] in (0.0, 1.0) and (number["unit"] == "1" or number["scale"] != "logarithm"):
-        return "as in the table"
+        return "as in the table" if record["row"] == "run" else "as given"
     return f"{plain(number['given'] * number['shown'], 4)} {number['unit']}"
 
 

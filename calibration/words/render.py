@@ -79,7 +79,7 @@ def _environment() -> Environment:
 _FILTERS: dict[str, Callable[..., str]] = {
     "percent": quantities.percent, "digits": quantities.digits, "p": quantities.p_in_words,
     "plain": quantities.plain, "size": quantities.size, "sized": quantities.sized,
-    "detectable": quantities.detectable, "given": quantities.given, "tolerance": quantities.tolerance,
+    "detectable": quantities.detectable, "tolerance": quantities.tolerance,
     "fitted_value": quantities.fitted_value, "direction": quantities.direction_in_words,
     "ranges": quantities.ranges_in_words, "removed": quantities.removed, "in_lab": length_in_lab,
 }  # fmt: skip
@@ -90,4 +90,5 @@ _OF_OUTPUTS: dict[str, Callable[..., str]] = {  # their first argument is the wh
     "error": quantities.error_in_words,
     "interval": quantities.interval_in_words,
     "along": quantities.along_in_words,
+    "given": quantities.given,
 }

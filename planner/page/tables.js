@@ -77,9 +77,10 @@ function textsOf(words) {
 /* Parse a table as its plain words: {names, words, lines}, with a column of words for each name, and the line of each
  * row; a table of numbers alone has the names 0, 1, … bytes: content of the file. where: its name, for messages. */
 function parseWords(bytes, where) {
-  const lines = decoded(Uint8Array.from(bytes), where).replaceAll("\r\n", "\n").replaceAll("\r", "\n").split("\n");
+  const text = decoded(Uint8Array.from(bytes), where).replaceAll("\ufeff", "");
+  const lines = text.replaceAll("\r\n", "\n").replaceAll("\r", "\n").split("\n");
   const top = lines.findIndex((line) => line.trim() && !isMarked(line));
-  if (top < 0) throw new InputError(`${where} is empty; give a table with one row per line`);
+  if (top < 0) throw empty(where);
   const separator = separatorOf(lines.slice(top), where);
   const { names, rows } = header(lines, top, separator, where);
   if (!rows.length) throw new InputError(`${where} has no rows; give at least one below the header`);
@@ -111,7 +112,9 @@ function parseWords(bytes, where) {
 
 /* The names of the columns, or null, and the rows below them. */
 function header(lines, top, separator, where) {
-  const rows = rowsOf(lines, top, separator, where), { words } = rows[0];
+  const rows = rowsOf(lines, top, separator, where);
+  if (!rows.length) throw empty(where); // quotes without a text, or separators
+  const { words } = rows[0];
   const above = lines.slice(0, top), commented = commentedNames(above, words.length, separator);
   if (words.every((word) => isNumber(word) || isMissing(word)) || (commented && words.some(isNumber))) {
     if (commented === null) { // what looked like comments may be rows
@@ -155,6 +158,10 @@ function isComment(words) {
   return isMarked(words[0]) && words.join(" ").search(MARKED_NUMBER) !== 0 && !isMissing(words[0]);
 }
 
+function empty(where) {
+  return new InputError(`${where} is empty; give a table with one row per line`);
+}
+
 /* Decode UTF-8, UTF-16 with a byte order mark, or Windows-1252. */
 function decoded(bytes, where) {
   const wide = bytes[0] === 0xff && bytes[1] === 0xfe ? "utf-16le" : bytes[0] === 0xfe && bytes[1] === 0xff
@@ -163,10 +170,8 @@ function decoded(bytes, where) {
   try {
     text = new TextDecoder(wide ?? "utf-8", { fatal: true }).decode(bytes);
   } catch {
-    if (bytes.some((byte) => [0x81, 0x8d, 0x8f, 0x90, 0x9d].includes(byte))) {
-      throw new InputError(`${where} is no text in UTF-8, UTF-16 or Latin-1`);
-    }
-    text = new TextDecoder("windows-1252").decode(bytes);
+    const undefinedBytes = [0x81, 0x8d, 0x8f, 0x90, 0x9d];
+    text = bytes.some((byte) => undefinedBytes.includes(byte)) ? "\0" : new TextDecoder("windows-1252").decode(bytes);
   }
   if (text.includes("\0")) throw new InputError(`${where} is no text; give a table as text, .xlsx or .parquet`);
   return text;
@@ -213,7 +218,7 @@ function commentedNames(lines, count, separator) {
 
 /* Refuse a name that stands above two columns. */
 function checkNames(names, where) {
-  const twice = names.find((name, i) => name && names.indexOf(name) !== i);
+  const twice = names.filter((name) => name).sort().find((name, i, sorted) => name === sorted[i + 1]);
   if (twice) throw new InputError(`${where} has two columns ${quoted(twice)}; rename or drop one`);
 }
 

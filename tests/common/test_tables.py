@@ -85,6 +85,11 @@ REFUSED = [
     ("x,y,x\n1,2,3\n", "two columns 'x'"),
     ("", "is empty"),
     ("# only a comment\n", "is empty"),
+    ('""\n', "is empty"),
+    (",,\n", "no rows"),
+    (" \t;\n", "no rows"),
+    ("\ufeff\ufeff\n", "is empty"),
+    ("b,b,a,a\n1,2,3,4\n", "two columns 'a'"),
     ("x,y\n", "no rows"),
     ("x,y\nmm,mm\n", "no rows"),
     ("x,y\n1,2\0\n", "is no text"),
@@ -98,6 +103,19 @@ REFUSED = [
     ("x;y\n1.200.300;1\n", "'1.200.300'; write numbers without"),
     ("x\ty\n1\u202f200\t1\n", r"'1\\u202f200'; write numbers without"),
 ]
+
+
+def test_files_that_were_joined_have_byte_order_marks_within() -> None:
+    table = parse_table(b"\xef\xbb\xbfx,y\n1,2\n\xef\xbb\xbf3,4\n", "t.csv")
+    assert table.to_dict("list") == {"x": [1, 3], "y": [2, 4]}
+
+
+@pytest.mark.parametrize("columns", [1, 10_000])
+def test_a_column_is_of_integers_where_all_are_written_so(columns: int) -> None:
+    """2.0, 1e3 and what no float holds exactly are none."""
+    rows = [["7", "2.0", "3", "9007199254740993", "-1"], ["8", "2", "1e3", "1", "0"]]
+    table = parse_table("\n".join(",".join(row * columns) for row in rows).encode(), "t.csv", names=False)
+    assert [dtype.kind for dtype in table.dtypes] == [*"ifffi"] * columns
 
 
 @pytest.mark.parametrize(("text", "words"), REFUSED)

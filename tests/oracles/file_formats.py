@@ -23,9 +23,9 @@ from calibration.swim.measured_swim import read_swims
 from calibration.swimmer.measured_table import read_measurements
 from camera.measured_runs import measure_tracks
 from camera.pose_tracks import read_tracks
-from camera.track_options import Source
 from common.errors import InputError, InputWarning, naming
 from common.tables import read_table
+from common.track_options import Source
 from dataset.data_set import MANIFEST, SWEEP, batches, read_design
 from dataset.design import SWEEP_TOML, load_design
 from dataset.folder import Folder
@@ -217,7 +217,7 @@ def _measure(path: Path) -> None:
 
 
 def _read_swims(plan: dict[str, Any] | None, path: Path) -> None:
-    for swum in read_swims(path, plan):
+    for swum in read_swims(read_tracks(path), plan, file=path):
         _finite(swum.time, swum.poses, swum.flips, swum.flip_error)
         assert (np.diff(swum.time) > 0).all(), "times do not increase"
         assert (swum.dwells > 0).all(), "a dwell has no length"

@@ -173,7 +173,7 @@ def test_an_alarm_ends_with_the_way_to_the_calibration(
 ) -> None:
     """Live and on the pipe; pictures without a pose are part of the track."""
     path = str(write_plan(LINE, tmp_path)[0])
-    line = "find out what the model lacks: softflagella calibrate track.csv --robot paper-control"
+    line = "find out what the model lacks: softflagella calibrate track.csv --robot paper-control --out calibrated"
 
     def steered_by(alarms: int) -> list[str]:
         def steer_by(ride: Ride, *_: object, row: Callable[..., object], **__: object) -> None:

@@ -10,7 +10,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calibration.statistics.study import quarter_of_conditions
 from calibration.swim.measured_swim import MeasuredSwim, is_track, read_swims
+from calibration.swim.swim_runs import runs_of_swims
+from calibration.table.excluded import summary_of_excluded
+from camera.pose_tracks import read_tracks
 from common.errors import InputError
 from planner.files.plan_files import write_plan
 from sim.motion.replay import replay
@@ -20,7 +24,8 @@ from tracking.swim import swim
 
 
 def read(table: pd.DataFrame | str | Path, plan: Any = None) -> MeasuredSwim:
-    (swum,) = read_swims(table, plan)
+    file = None if isinstance(table, pd.DataFrame) else table
+    (swum,) = read_swims(read_tracks(table), plan, file=file)
     assert (np.diff(swum.time) > 0).all()
     assert len(swum.time) == len(swum.poses) >= 60
     assert (swum.time >= swum.flips[0]).all()
@@ -216,7 +221,7 @@ def test_bad_tables_are_refused_in_one_line(tmp_path: Path) -> None:
         file = tmp_path / "track.csv"
         table.to_csv(file, index=False)
         with pytest.raises(InputError) as caught:
-            read_swims(file)
+            read_swims(read_tracks(file), file=file)
         assert str(caught.value).startswith(str(file))
         return str(caught.value).removeprefix(f"{file}: ")
 
@@ -298,11 +303,20 @@ def test_tracks_of_other_programs_need_the_plan(tmp_path: Path) -> None:
     half, zero = poses[:, 2] / 2, np.zeros(len(table))
     columns = [table["time_s"].to_numpy(), poses[:, 0], poses[:, 1], zero, zero, zero, np.sin(half), np.cos(half)]
     np.savetxt(tmp_path / "track.tum", np.stack(columns, 1))
-    assert is_track(tmp_path / "track.tum")
+    assert is_track(read_tracks(tmp_path / "track.tum"))
     assert_true(read(tmp_path / "track.tum", PLAN))
     both = pd.concat([table.assign(run=1), table.assign(run=2)])
     both.attrs["lost"] = ["2 poses are lost"]
     assert [each.said for each in read_swims(both)] == [("2 poses are lost",), ()]
+
+
+def test_what_is_said_of_a_track_is_kept_with_its_poses() -> None:
+    table = track()
+    table.loc[100:104, ["x_cm", "y_cm", "heading_deg"]] = np.nan
+    runs, held_out = runs_of_swims([read(table)], 0.1)
+    assert runs.row == "pose"
+    assert summary_of_excluded(runs.excluded, len(runs)) == [f"swim: 5 of {len(table)} rows have no pose"]
+    assert quarter_of_conditions(runs, ~held_out)[1] == "a quarter of the stretches"
 
 
 def test_a_track_is_told_from_a_table_of_runs() -> None:

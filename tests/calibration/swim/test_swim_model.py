@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import softflagella as sf
+from calibration.report.figures import draw_residuals
 from calibration.robot.robot_verdict import RobotVerdict
 from calibration.statistics.forward import derivatives
 from calibration.statistics.statistical_model import start_values
@@ -162,6 +163,11 @@ def test_a_swim_is_reported_with_its_track(tmp_path: object) -> None:
     verdict = verdict_of(0.1)
     _, report, corrected = verdict.save(str(tmp_path))
     assert "track in the plane" in report.read_text()
+    assert "poses (last third of swim) were held out" in report.read_text()
+    for figure, _ in draw_residuals(verdict):  # in cm and degrees, not in standard deviations
+        assert [max(axes.get_ylim()) < most for axes, most in zip(figure.axes, (5, 5, 30), strict=False)] == 3 * [
+            True
+        ]
     assert "left_right_bias" in corrected.read_text()
 
 

@@ -1,4 +1,7 @@
-"""What is said in all combinations of a verdict and its flags: one advice, and no word of a robot without one."""
+"""What is said in all combinations of a verdict and its flags: one advice, and no word of what is not there.
+
+There is no robot where a model is calibrated, and there are no runs where a robot is calibrated from a swim.
+"""
 
 from __future__ import annotations
 
@@ -23,6 +26,11 @@ Record = dict[str, Any]
 
 OF_A_ROBOT = re.compile(
     r"robot|\btails?\b|tank|camera|motor|swim|softflagella|corrected\.toml|slip angle|heading", re.IGNORECASE
+)
+OF_RUNS = re.compile(r"\bruns?\b|\bsession|\brepeat|\bconditions\b|\btable of (?!evidence)|number of tails")
+NAMES_RUNS = re.compile(  # where it is said what a swim cannot tell
+    r"from runs with other numbers of tails and tail lengths|by runs with other numbers of tails and tail lengths|"
+    r"softflagella calibrate runs.csv|from a table of runs|a table of runs may have|\(column ?`?run`? ?\)"
 )
 P_VALUE = re.compile(r"\bp [=≤]")
 SPOILT = re.compile(r"\bNone\b|\bnan\b|Undefined|  |\.\.|[.,;:] [.,;]|\(\)| [.,;)]|\( ")
@@ -50,6 +58,8 @@ FORMS = [
 UNFITTED = {"title": "drag", "reason": "its fit did not converge"}
 FORBIDDEN = {"title": "decoy", "error_before": 0.12, "error_after": 0.17}
 CONDITIONS = {"names": "balls 2 and 5", "before": 0.12, "after": 0.04, "p_value": 0.2}
+SWIM = {"row": "pose", "locked_test": "last third of swim", "sessions": ["swim"], "next_runs": [],
+        "limits": [], "drawn_against": ["time", "direction of the motor"]}  # fmt: skip
 BATCH = {"runs": 4 * [{"depth": 4.0}], "decides": 0.9, "worth_making": True}
 GAINS: dict[str, Record] = {
     "certain": {"error_after": 0.04, "gain_interval": [0.05, 0.11], "gain_is_certain": True},
@@ -98,7 +108,7 @@ def with_flags(verdict: str, changes: Record) -> Record:
 def combinations(verdict: str) -> Iterator[Record]:
     """All combinations of the flags of a verdict."""
     flags: dict[str, tuple[Record, ...]] = {
-        "subject": ({"subject": "model"}, {"subject": "robot"}),
+        "subject": ({"subject": "model"}, {"subject": "robot"}, {"subject": "robot", **SWIM}),
         "agree": ({"held_out_runs_agree": True, "locked_p_value": 0.4}, {"held_out_runs_agree": False}),
         "moves": ({}, {"moves": [MOVE]}),
         "given": ({}, {"given_is_best": True}),
@@ -158,11 +168,13 @@ def combinations(verdict: str) -> Iterator[Record]:
             }  # fmt: skip
     for chosen in product(*flags.values()):
         record = {key: value for change in chosen for key, value in change.items()}
+        if "row" in record:
+            record["next_batch"] = None  # a swim has no next runs
         yield with_flags(verdict, record)
         if verdict in ("none", "partial") and record["held_out_runs_agree"] and "moves" not in record:
             scored = [{**c, "verdict": "not needed"} for c in falling_balls()["candidates"]]
             yield with_flags(verdict, {**record, "noise_known": False, "candidates": scored})
-        if verdict == "unexplained" and record["subject"] == "robot":  # laws are a robot's
+        if verdict == "unexplained" and chosen[0] == {"subject": "robot"}:  # laws are of its runs
             for batch in batches:
                 yield with_flags(verdict, {**record, **laws, **batch, "described": "harmless" not in record})
 
@@ -187,16 +199,22 @@ def test_every_combination_is_said_in_whole_sentences_with_one_advice(verdict: s
         assert ("--robot corrected.toml" in first) == (advice == "corrected" and record["subject"] == "robot")
         bears_out = record["held_out_error_falls"] and record["gain_is_certain"] is not False
         if verdict in ("number", "effect", "ambiguous"):
-            assert ("does not fall" in said or "no gain that these runs can show" in said) == (not bears_out), said
+            no_gain = f"no gain that these {record['row']}s can show"
+            assert ("does not fall" in said or no_gain in said) == (not bears_out), said
             assert bears_out or advice != "corrected", steps
         assert not re.search(r"\bNone\b|\bnan\b|Undefined|\.\.", seen), seen
         if record["subject"] == "model":
             for text in (said, errors, *steps, seen):
                 assert not OF_A_ROBOT.search(text), text
+        if record["row"] == "pose":
+            for text in (said, errors, *steps, seen):
+                assert not OF_RUNS.search(
+                    NAMES_RUNS.sub("", text.replace(MOVE["words"][1:], "").replace(MOVE["where"], ""))
+                ), text
         if not record["noise_known"]:
             for text in (said, errors, *steps, seen):
                 assert not P_VALUE.search(text), text
-                assert "noise of a run" not in text
+                assert f"noise of a {record['row']}" not in text
     assert advised == {"as given", "corrected", "wait"}  # also where a form halves the error on left-out runs
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -206,7 +207,7 @@ def test_check_of_a_track_that_misses_a_part_ends_with_status_3(
     told = capsys.readouterr()
     assert told.out.startswith("MISSED a part of the declared path")
     assert told.err == f"error: {part} misses a part of the declared path\n"
-    words = f"softflagella calibrate {part} --robot paper-control --plan {json_file}"
+    words = f"softflagella calibrate {part} --robot paper-control --plan {json_file} --out calibrated"
     assert told.out.splitlines()[1:] == [f"-> {overlay}", f"find out what the model lacks: {words}"]
     assert overlay.exists()
 
@@ -214,9 +215,11 @@ def test_check_of_a_track_that_misses_a_part_ends_with_status_3(
 def test_what_is_next_names_the_robot_as_far_as_it_is_known() -> None:
     """A preset by its name, unless it was changed; a measured vehicle has no model that could lack anything."""
     record = planned().to_dict()
-    assert what_next(record, "my track.csv").endswith(" calibrate 'my track.csv' --robot paper-control")
+    assert what_next(record, "my track.csv").endswith(
+        " calibrate 'my track.csv' --robot paper-control --out calibrated"
+    )
     changed = {**record, "robot": {**record["robot"], "time_scale_s": 1.1 * record["robot"]["time_scale_s"]}}
-    assert what_next(changed, "track.csv").endswith(" calibrate track.csv --robot robot.toml")
+    assert what_next(changed, "track.csv").endswith(" calibrate track.csv --robot robot.toml --out calibrated")
     assert what_next({**record, "robot": {"name": "toy", "vehicle": {}}}, "track.csv") == ""
 
 
@@ -236,7 +239,11 @@ def test_tracks_of_another_program_are_read_as_options_say(
     assert err == f"{file}: 1 of 40 poses are lost\n"
     told, line = out.splitlines()
     assert told == wanted.line
-    assert line.endswith(f"--plan {json_file} --from deeplabcut --scale 0.5mm --fps 25.0 --origin 900 700")
+    command = line.partition("softflagella ")[2]
+    told_options = "--from deeplabcut --scale 0.5mm --fps 25.0 --origin 900 700"
+    assert command.endswith(f"--plan {json_file} {told_options} --out calibrated")
+    with pytest.raises(InputError, match="a swim needs 60 poses; there are 39"):
+        main(shlex.split(command))
     with pytest.warns(UserWarning, match="1 of 40 poses are lost") as warned:
         assert check(json_file, file, **options, origin=(900.0, 700.0)).rms == wanted.rms
     assert [each.filename for each in warned] == [__file__]

@@ -45,7 +45,7 @@ TABLES = [
 ]  # fmt: skip
 BAD_TABLES = [
     *(text.encode() for text, _ in (*REFUSED, *TITLED)), b"\n\n", b"x,y\n1,2,3\n4,5,6,7\n", b'x,y\n"1"2,3\n',
-    b"x;y\n1 200;1\n", "x;y\n1\u202f200,5;1\n".encode(), b"'=x,'=x\n1,2\n", b"x\ty\n1 2\n3 4\n",
+    b"x;y\n1 200;1\n", "x;y\n1\u202f200,5;1\n".encode(), b"'=x,'=x\n1,2\n", b"x\ty\n1 2\n3 4\n", b"x,y\n1,\x81\n",
 ]  # fmt: skip
 PATHS = [
     *(text.encode() for text in (*ALIKE, *SIZED)), b"x,y\n0,0\n1,0\n1,1\n0,0\n",
