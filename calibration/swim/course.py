@@ -30,10 +30,10 @@ from sim.motion.response import responses
 from sim.motion.steady import steady
 from sim.solve.march import YAW, X, Y
 
-_TOLERANCE, _MESHES = 1e-3, (4, 6)  # of the curves; differences of them count
+_TOLERANCE, _MESHES = 1e-4, (4, 6)  # of the curves; differences of them count
 _END = 1e-9  # of a dwell
-_STEP = 0.05  # of `_size`, for slopes of lags
-_FAR = 0.25  # of `_distance`, from which slopes are simulated again
+_STEP = 0.02  # of `_size`, for slopes of lags
+_FAR = 0.1  # of `_distance`, from which slopes are simulated again
 _BROKE = "the simulation of a swim broke down; check the robot and its motor speed"
 
 
