@@ -2,14 +2,12 @@
 
 One robot, the base, is simulated in time steps (`sim.motion.replay`). Its motion in a dwell is that of the
 planner's vehicle (`planner.vehicle.vehicle`), lag and arc, and a small rest, which the vehicle leaves out. Other
-robots have the rest of the base, twists of their own, solved for directly, and lags by their derivatives from the
-nearest robot of which they are known. So what a number changes costs a hundredth of a second. The rest of another
-robot has another phase of the disc at each flip, so it counts as noise where it differs.
+robots have vehicles of their own, and the rest of the base. So what a number changes costs a hundredth of a
+second. The rest of another robot has another phase of the disc at each flip: it counts as noise where it differs.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -32,10 +30,10 @@ from sim.motion.response import responses
 from sim.motion.steady import steady
 from sim.solve.march import YAW, X, Y
 
-_TOLERANCE, _MESHES = 1e-3, (4, 6)  # of the curves; differences of them count
+_TOLERANCE, _MESHES = 1e-4, (4, 6)  # of the curves; differences of them count
 _END = 1e-9  # of a dwell
-_STEP = 0.02  # of a number, and of the typical size of an effect, for derivatives of lags
-_FAR = 0.08  # of `_distance`, from which lags are simulated again
+_STEP = 0.02  # of `_size`, for slopes of lags
+_FAR = 0.1  # of `_distance`, from which slopes are simulated again
 _BROKE = "the simulation of a swim broke down; check the robot and its motor speed"
 
 
@@ -55,27 +53,23 @@ class Lags(NamedTuple):
     rest: Floats  # (T, 3)
 
 
-class Centre(NamedTuple):
-    """A robot whose lags are simulated."""
-
-    columns: Mapping[str, float]  # the motor forward
-    lags: dict[int, Lags]  # by the direction of the motor
+_Columns = tuple[tuple[str, float], ...]  # of a robot, sorted; the motor forward, effects that work
 
 
 @dataclass(frozen=True)
-class Near:
-    """Vehicles of robots near one: their twists are solved for, their lags follow from derivatives at this one.
+class Vehicles:
+    """Makes vehicles of robots: their twists are solved for, their lags simulated.
 
-    Lags take a hundred times as long as steady motions. They are simulated at the robot, and again wherever
-    another one is far from all that are known.
+    Lags take longer than steady motions, so what was simulated is kept. For derivatives, the lags of robots close
+    to one are its own, and their slopes times the change. These are simulated at a robot not far away.
     """
 
-    robot: Mapping[str, float]  # columns; the motor forward
-    slopes: dict[tuple[str, int], Lags] = field(default_factory=dict)  # by column and direction of the motor
-    centres: list[Centre] = field(default_factory=list)
+    known: dict[tuple[_Columns, int], Lags] = field(default_factory=dict)  # by robot and direction of the motor
+    slopes: dict[tuple[_Columns, str, int], Lags] = field(default_factory=dict)  # by column, too
+    centres: list[_Columns] = field(default_factory=list)  # robots of slopes
 
     def swimming(
-        self, columns: Mapping[str, Floats], pairs: Integers, time: Floats, length: Floats
+        self, columns: Mapping[str, Floats], pairs: Integers, time: Floats, length: Floats, *, close: bool
     ) -> list[Swimming]:
         """Make P robots.
 
@@ -84,94 +78,112 @@ class Near:
             pairs: (P, 2) those with the motor forward and reversed.
             time: (P,) units of time [s].
             length: (P,) units of length [m].
+            close: all are close to the first.
 
         Raises:
             InputError: a motion cannot be found.
         """
-        groups = Groups.from_columns(check_columns(columns))
-        steadily = steady(groups, stability=False)
+        steadily = steady(Groups.from_columns(check_columns(columns)), stability=False)
         twist = np.stack([steadily.v_z, steadily.v_x, steadily.omega_yr], -1)
         if not np.isfinite(twist).all():
             raise InputError(_BROKE)
-        direction = np.sign(columns["omega_bar"]).astype(int)
-        twist[direction < 0] *= planar.MIRROR
+        directions = np.sign(columns["omega_bar"]).astype(int)
+        twist[directions < 0] *= planar.MIRROR
         forward = {**columns, "omega_bar": np.abs(columns["omega_bar"])}
         robots = [dict(zip(forward, row, strict=True)) for row in np.stack([*forward.values()], 1).tolist()]
-        moved = [name for name, column in forward.items() if (column != self._value(name)).any()]
-        self._learn([(name, sense) for sense in np.unique(direction).tolist() for name in moved])
-        lags = [self._lags(robot, sense) for robot, sense in zip(robots, direction.tolist(), strict=True)]
+        wanted = [(_at_work(robot), sense) for robot, sense in zip(robots, directions.tolist(), strict=True)]
+        lags = self._close(_at_work(robots[pairs[0, 0]]), wanted) if close else self._simulated(wanted)
         return [
             Swimming(_vehicle(twist[pair], [lags[place] for place in pair]), robots[pair[0]], unit, size)
             for pair, unit, size in zip(pairs.tolist(), time.tolist(), length.tolist(), strict=True)
         ]
 
-    def _value(self, name: str) -> float:
-        return float(self.robot.get(name, _null(name)))
+    def _simulated(self, wanted: Sequence[tuple[_Columns, int]]) -> list[Lags]:
+        """Simulate the lags of robots, each in one direction of its motor, unless they are known.
 
-    def _lags(self, robot: Mapping[str, float], sense: int) -> Lags:
-        """Compute lags by the derivatives from the nearest centre; without one nearby, the robot becomes one."""
-        near = min(self.centres, key=lambda centre: _distance(centre.columns, robot), default=None)
-        if near is None or _distance(near.columns, robot) > _FAR:
-            near = Centre(robot, {})
-            self.centres.append(near)
-        if sense not in near.lags:
-            (near.lags[sense],) = _simulated([near.columns], [sense])
-        lag, rest = near.lags[sense]
-        for name, value in robot.items():
-            if change := value - near.columns.get(name, _null(name)):
-                slope = self.slopes[name, sense]
-                lag, rest = lag + change * slope.lag, rest + change * slope.rest
-        return Lags(lag, rest)
+        Raises:
+            InputError: a flip breaks down.
+        """
+        if new := [each for each in dict.fromkeys(wanted) if each not in self.known]:
+            robots = [dict(robot) for robot, _ in new]
+            names = sorted({name for robot in robots for name in robot})
+            columns = {name: np.array([robot.get(name, _null(name)) for robot in robots]) for name in names}
+            columns["omega_bar"] = columns["omega_bar"] * np.array([sense for _, sense in new])
+            curves = responses(Groups.from_columns(check_columns(columns)), tolerance=_TOLERANCE, meshes=_MESHES)
+            if curves.failed.any():
+                raise InputError(_BROKE)
+            tables = lag_table(curves.lag, curves.memory, curves.before), resampled(curves.rest)
+            self.known.update((each, Lags(*of)) for each, *of in zip(new, *tables, strict=True))
+        return [self.known[each] for each in wanted]
 
-    def _learn(self, wanted: Sequence[tuple[str, int]]) -> None:
-        """Simulate derivatives of the lags that are not known."""
-        wanted = [each for each in wanted if each not in self.slopes]
-        if not wanted:
-            return
-        steps = [_STEP * (_typical(name) if is_effect(name) else self._value(name)) for name, _ in wanted]
-        senses = sorted({sense for _, sense in wanted})
-        stepped = [
-            {**self.robot, name: self._value(name) + step} for (name, _), step in zip(wanted, steps, strict=True)
+    def _close(self, first: _Columns, wanted: Sequence[tuple[_Columns, int]]) -> list[Lags]:
+        """Find the lags of robots close to a first one."""
+        centre = min(self.centres, key=lambda other: _distance(other, first), default=first)
+        if centre not in self.centres or _distance(centre, first) > _FAR:
+            centre = first
+            self.centres.append(first)
+        changes = [_change(first, robot) for robot, _ in wanted]
+        moved = {(name, sense) for change, (_, sense) in zip(changes, wanted, strict=True) for name in change}
+        self._learn(centre, sorted(moved))
+        at = dict(zip((1, -1), self._simulated([(first, 1), (first, -1)]), strict=True))
+        return [
+            Lags(
+                *(
+                    whole + sum(change * self.slopes[centre, name, sense][part] for name, change in moves.items())
+                    for part, whole in enumerate(at[sense])
+                )
+            )
+            for moves, (_, sense) in zip(changes, wanted, strict=True)
         ]
-        lags = _simulated([*(self.robot for _ in senses), *stepped], [*senses, *(sense for _, sense in wanted)])
-        at = dict(zip(senses, lags, strict=False))
-        for (name, sense), step, ahead in zip(wanted, steps, lags[len(senses) :], strict=True):
-            pairs = zip(ahead, at[sense], strict=True)
-            self.slopes[name, sense] = Lags(*((after - before) / step for after, before in pairs))
+
+    def _learn(self, centre: _Columns, moved: Sequence[tuple[str, int]]) -> None:
+        """Simulate those slopes at a robot that are not known."""
+        at, wanted = dict(centre), [each for each in moved if (centre, *each) not in self.slopes]
+        steps = [_step(name, at.get(name, _null(name))) for name, _ in wanted]
+        ahead = [
+            (_at_work({**at, name: at.get(name, _null(name)) + step}), sense)
+            for (name, sense), step in zip(wanted, steps, strict=True)
+        ]
+        lags = self._simulated([*((centre, sense) for _, sense in wanted), *ahead])
+        for each, step, before, after in zip(wanted, steps, lags, lags[len(wanted) :], strict=False):
+            self.slopes[centre, *each] = Lags(*((b - a) / step for a, b in zip(before, after, strict=True)))
 
 
 def _null(name: str) -> float:
     return float(effect_named(name).null) if is_effect(name) else 0.0
 
 
-def _typical(name: str) -> float:
-    return abs(float(effect_named(name).typical - effect_named(name).null))
-
-
-def _distance(robot: Mapping[str, float], other: Mapping[str, float]) -> float:
-    """Compute how far two robots are apart: in the logarithm of a number, or a fortieth of a typical size."""
-    return max(
-        abs(robot.get(name, _null(name)) - other.get(name, _null(name))) / _typical(name) / 40
-        if is_effect(name)
-        else abs(math.log(robot[name] / other[name]))
-        for name in {*robot, *other}
+def _at_work(robot: Mapping[str, float]) -> _Columns:
+    """Sort the columns of a robot, without effects at their null."""
+    return tuple(
+        sorted((name, value) for name, value in robot.items() if not is_effect(name) or value != _null(name))
     )
 
 
-def _simulated(robots: Sequence[Mapping[str, float]], senses: Sequence[int]) -> list[Lags]:
-    """Simulate the lags of B robots, each in one direction of its motor.
+def _change(robot: _Columns, other: _Columns) -> dict[str, float]:
+    """Compute by how much the columns of another robot differ."""
+    of, to = dict(robot), dict(other)
+    changes = {name: to.get(name, _null(name)) - of.get(name, _null(name)) for name in sorted({*of, *to})}
+    return {name: change for name, change in changes.items() if change}
 
-    Raises:
-        InputError: a flip breaks down.
-    """
-    names = sorted({name for robot in robots for name in robot})
-    columns = {name: np.array([robot.get(name, _null(name)) for robot in robots]) for name in names}
-    columns["omega_bar"] = columns["omega_bar"] * np.array(senses)
-    curves = responses(Groups.from_columns(check_columns(columns)), tolerance=_TOLERANCE, meshes=_MESHES)
-    if curves.failed.any():
-        raise InputError(_BROKE)
-    tables = lag_table(curves.lag, curves.memory, curves.before), resampled(curves.rest)
-    return [Lags(*each) for each in zip(*tables, strict=True)]
+
+def _size(name: str, value: float) -> float:
+    """Return the size of a column: its value, or what is typical of an effect."""
+    return abs(float(effect_named(name).typical - effect_named(name).null)) if is_effect(name) else value
+
+
+def _step(name: str, value: float) -> float:
+    """Choose a step for a slope, within the bounds of an effect."""
+    step = _STEP * _size(name, value)
+    return -step if is_effect(name) and value + step > effect_named(name).bounds[1] else step
+
+
+def _distance(robot: _Columns, other: _Columns) -> float:
+    """Compute how far two robots are apart, in sizes of their columns."""
+    of = dict(robot)
+    return max(
+        (abs(by) / _size(name, of.get(name, 0.0)) for name, by in _change(robot, other).items()), default=0.0
+    )
 
 
 def _vehicle(twist: Floats, lags: Sequence[Lags]) -> Vehicle:

@@ -17,7 +17,7 @@ import numpy as np
 from calibration.statistics.budget import count_predictions
 from calibration.statistics.forward import central
 from calibration.statistics.statistical_model import ForwardModel, Parameter, Parameters, Predict, start_values
-from calibration.swim.course import Base, Near, Swimming
+from calibration.swim.course import Base, Swimming, Vehicles
 from calibration.swim.free_vehicle import with_noise
 from calibration.swim.measured_swim import MeasuredSwim
 from calibration.swim.sight import Sight
@@ -39,7 +39,8 @@ class SwimModel:
     robot: SwimmerModel  # at constant motor, in both directions
     sight: Sight
     runs: SwimRuns  # those of the sight
-    near: Near = field(default_factory=lambda: Near({}))  # the base
+    vehicles: Vehicles = field(default_factory=Vehicles)
+    around: bool = False  # whether robots are close to the first that is asked for, see `Vehicles.swimming`
     began: Mapping[str, float] = field(default_factory=dict)  # where fits begin
 
     @property
@@ -79,7 +80,7 @@ class SwimModel:
     ) -> Predict:
         """Return the linear model, by differences; NaN if `quick` where a robot cannot be simulated."""
         try:
-            return central(self, at, along, title=title)
+            return central(replace(self, around=True), at, along, title=title)
         except InputError:
             if not quick:
                 raise
@@ -90,16 +91,13 @@ class SwimModel:
         inputs, columns, same = self.robot.simulated([self.sight.without(one) for one in sets])
         count_predictions(len(columns["N"]))
         length, time = (np.broadcast_to(x, same.shape)[:, 0] for x in (inputs.view.length, inputs.view.time))
-        return self.near.swimming(columns, same, time, length)
+        return self.vehicles.swimming(columns, same, time, length, close=self.around)
 
     def based(self, at: Parameters) -> SwimModel:
         """Simulate the robot at some parameters along all swims, as the base of all others."""
-        columns = self.robot.simulated([self.sight.without(at)]).columns
-        robot = {name: float(column[0]) for name, column in columns.items()}
-        model = replace(self, near=Near({**robot, "omega_bar": abs(robot["omega_bar"])}))
-        (base,) = model.swimming([at])
+        (base,) = self.swimming([at])
         bases = tuple(Base.of(swim, base) for swim in self.runs.swims)
-        return replace(model, sight=replace(self.sight, bases=bases))
+        return replace(self, sight=replace(self.sight, bases=bases))
 
 
 def swim_model(robot: Robot, swims: Sequence[MeasuredSwim], *, jobs: int | None = None) -> tuple[SwimModel, Flags]:

@@ -11,9 +11,9 @@ import pytest
 import softflagella as sf
 from calibration.report.figures import draw_residuals
 from calibration.robot.robot_verdict import RobotVerdict
-from calibration.statistics.forward import derivatives
+from calibration.statistics.forward import by_differences, derivatives
 from calibration.statistics.statistical_model import start_values
-from calibration.swim.course import Near, Swimming
+from calibration.swim.course import Swimming, Vehicles
 from calibration.swim.free_vehicle import with_noise
 from calibration.swim.measured_swim import MeasuredSwim, read_swims
 from calibration.swim.pose_noise import Sizes
@@ -21,6 +21,7 @@ from calibration.swim.swim_model import SwimModel, swim_model
 from common.arrays import Floats
 from common.errors import InputError
 from planner.planning.plan import Plan
+from sim.knowledge import COEFFICIENTS
 from sim.model.robot import Robot
 from tests.oracles.swims import CameraNoise, make_track, swum
 from tests.planner.plans import CONTROL
@@ -79,6 +80,22 @@ def test_poses_are_those_of_the_simulator(robot: Robot, effects: dict[str, float
 
 
 @pytest.mark.slow
+def test_a_prediction_does_not_depend_on_those_before() -> None:
+    """So a fit that goes another way ends at the same place, and its derivatives are those of the model."""
+    plan = plan_of(THREE, 1.5)
+    swims = read_swims(make_track(THREE, plan, seed=0), plan)
+    fresh, other = (swim_model(THREE, swims)[0] for _ in range(2))
+    start = start_values(fresh)
+    away = [{**start, **{name: by * start[name] for name in COEFFICIENTS}} for by in (1.05, 1.12, 1.2)]
+    for at in away:
+        derivatives(other, at, COEFFICIENTS)
+    seen, slopes = derivatives(other, away[-1], COEFFICIENTS)
+    np.testing.assert_array_equal(seen, fresh.predict(away[-1:])[0])
+    exact = by_differences(fresh, away[-1], COEFFICIENTS)[1]
+    assert np.abs(slopes - exact).max() < 0.03 * np.abs(exact).max()
+
+
+@pytest.mark.slow
 def test_the_noise_needs_no_model() -> None:
     """A hidden effect does not hide in it."""
     plan, found = plan_of(CONTROL, 3.0), []
@@ -103,10 +120,10 @@ def test_a_fit_turns_back_where_a_robot_cannot_be_simulated(monkeypatch: pytest.
     model, _ = swim_model(CONTROL, [swim])
     start = start_values(model)
 
-    def broken(*_: object) -> list[Swimming]:
+    def broken(*_: object, **__: object) -> list[Swimming]:
         raise InputError("broke down")
 
-    monkeypatch.setattr(Near, "swimming", broken)
+    monkeypatch.setattr(Vehicles, "swimming", broken)
     seen, slopes = derivatives(model, start, ["C_t"], quick=True)
     assert np.isnan(seen).all()
     assert np.isnan(slopes).all()
