@@ -75,7 +75,7 @@ def test_the_true_explanation_is_seldom_given_up() -> None:
     def model(y: np.ndarray, *outputs: str) -> Any:
         """Its parameter's name says which prediction is meant."""
         known = tuple(Parameter(name, name, 0.0, (-9.0, 9.0), 1.0) for name in predictions)
-        runs = SimpleNamespace(y=y, session=np.zeros(n, int), outputs=outputs or ("a", "b"))
+        runs = SimpleNamespace(y=y, session=np.zeros(n, int), along=np.ones(n), outputs=outputs or ("a", "b"))
         return SimpleNamespace(
             runs=runs, coefficients=known, nuisances=(), effects=(),
             linearised=lambda at, along, **_: lambda sets: np.array(
@@ -106,7 +106,7 @@ def test_an_explanation_is_given_up_where_another_is_25_times_as_likely(ratio: f
     known = tuple(Parameter(name, name, 0.0, (-9.0, 9.0), 1.0) for name in "AB")
     predictions = {"A": 0.0, "B": math.sqrt(2 * math.log(ratio))}
     model: Any = SimpleNamespace(
-        runs=SimpleNamespace(y=np.zeros((1, 1)), session=np.zeros(1, int), outputs=("y",)),
+        runs=SimpleNamespace(y=np.zeros((1, 1)), session=np.zeros(1, int), along=np.ones(1), outputs=("y",)),
         coefficients=known, nuisances=(), effects=(),
         linearised=lambda at, along, **_: lambda sets: np.full((len(sets), 1, 1), predictions[along[0].name]),
     )  # fmt: skip
@@ -142,12 +142,12 @@ def pair(*differences: float) -> Pair:
 
 
 def test_a_batch_repeats_the_best_setting_unless_a_parameter_or_a_session_absorbs_it() -> None:
-    chosen, strength = _greedy([pair(1.0, 3.0, 2.0)], Noise(np.array([[0.5]]), 0.0))
+    chosen, strength = _greedy([pair(1.0, 3.0, 2.0)], Noise(np.array([[0.5]]), 0.0), [[0], [1], [2]])
     assert chosen == [1] * BATCH
     assert strength == pytest.approx(BATCH * 9 / 0.5)
     shifted = Pair(np.array([[1.0], [-1.0]]), np.ones((2, 1, 1)), np.array([[1e6]]))  # all outputs alike
     assert _together([shifted], Noise(np.eye(1), 0.0), [0] * 8) == pytest.approx(0, abs=1e-3)
-    chosen, strength = _greedy([shifted], Noise(np.eye(1), 0.0))
+    chosen, strength = _greedy([shifted], Noise(np.eye(1), 0.0), [[0], [1]])
     assert chosen == [0] * 4 + [1] * 4
     assert strength == pytest.approx(8, rel=1e-3)
     scatter = Noise(np.eye(1), 10.0)  # of sessions, which shift the runs of a day
@@ -159,7 +159,7 @@ def test_a_batch_repeats_the_best_setting_unless_a_parameter_or_a_session_absorb
 def test_a_batch_serves_all_pairs_of_rivals() -> None:
     """The first setting tells the first two apart, the second the others: a batch for all has both."""
     pairs = [pair(3.0, 0.0), pair(0.0, 2.0), pair(0.0, 2.0)]
-    chosen, strength = _greedy(pairs, Noise(np.eye(1), 0.0))
+    chosen, strength = _greedy(pairs, Noise(np.eye(1), 0.0), [[0], [1]])
     assert set(chosen) == {0, 1}
     assert chosen.count(1) > chosen.count(0)
     assert strength == pytest.approx(min(9 * chosen.count(0), 4 * chosen.count(1)))
