@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -54,6 +55,7 @@ def decide(
         explanations, before = read_explanations(verdict)
     if plan is not None or is_track(table):
         swum, _ = swim_model(one_robot(robot), read_swims(table, plan), jobs=jobs)
-        return decide_between(swum, explanations, before)
+        decision = decide_between(swum, explanations, before)
+        return replace(decision, new_runs=sum(swim.name not in before for swim in swum.runs.swims))
     model = SwimmerModel(one_robot(robot), read_measurements(table), jobs)
     return decide_between(model, explanations, before, with_law)

@@ -55,6 +55,7 @@ _DRAWS = 4000
 _DECIDES = 3.84  # difference of χ² at which one of the two is chosen
 _PROPOSED = 3  # single settings
 _WANTED = 0.9  # share of draws that should decide
+_ENOUGH = 13.1  # λ at which they do
 _MOST_REPEATS = 16
 _MOST_RIVALS = 4
 _WIDE = 1e3  # standard deviation of a number of new runs' own without a tolerance, in typical sizes or logarithms
@@ -117,8 +118,12 @@ class Pair(NamedTuple):
 def next_runs(rivals: Sequence[Hypothesis], *, seed: int = 0) -> tuple[tuple[NextRun, ...], Batch]:
     """Find the best experiments to tell (the first four) rivals apart, best first, and the best `BATCH` runs.
 
-    Of experiments of several rows, such as swims, all are listed, none is repeated, and the batch is the best one.
-    Numbers of their own take the place of what a session shifts.
+    Of experiments of several rows, such as swims, all are listed, the cheapest first of those that decide in
+    `_WANTED` of cases. None is repeated, and the batch is the best one. The numbers of its own take the place of
+    what a session shifts.
+
+    Raises:
+        InputError: a run cannot be simulated; of swims none can.
     """
     told_apart = rivals[:_MOST_RIVALS]
     fits = [rival.fitted for rival in told_apart]
@@ -135,6 +140,8 @@ def next_runs(rivals: Sequence[Hypothesis], *, seed: int = 0) -> tuple[tuple[Nex
     solved = np.array([np.isfinite(prediction).all(1) & np.isfinite(J).all((1, 2)) for prediction, J, _ in sides])
     experiments = [np.flatnonzero(first.runs.condition == place) for place in range(len(settings))]
     kept = [place for place, of in enumerate(experiments) if solved[:, of].all()]
+    if not kept:
+        raise InputError("no run that is possible can be simulated")
     settings, rows = [settings[place] for place in kept], [experiments[place].tolist() for place in kept]
     whole = max(map(len, rows)) > 1
     ratio = np.mean([np.asarray(f.noise.session_ratio) for f in fits], 0)
@@ -142,14 +149,17 @@ def next_runs(rivals: Sequence[Hypothesis], *, seed: int = 0) -> tuple[tuple[Nex
     alone = np.array([_together(pairs, noise, of).min() for of in rows])
     runs = []
     rng = np.random.default_rng(seed)
-    for place in np.argsort(-alone)[: None if whole else _PROPOSED].tolist():
+    order = np.argsort(-np.minimum(alone, _ENOUGH if whole else math.inf), kind="stable")
+    for place in order[: None if whole else _PROPOSED].tolist():
         for repeats in (1,) if whole else (1, 2, 4, 8, _MOST_REPEATS):
             strength = float(_together(pairs, noise, rows[place] * repeats).min())
             decides = _decides(strength, rng)
             if decides >= _WANTED:
                 break
         runs.append(NextRun(settings[place], repeats, strength, decides))
-    chosen, strength = _greedy(pairs, noise, rows, 1 if whole else BATCH)
+    if whole:
+        return tuple(runs), Batch((runs[0].settings,), runs[0].separation, runs[0].decides)
+    chosen, strength = _greedy(pairs, noise)
     batch = tuple(settings[place] for place in chosen)
     return tuple(runs), Batch(batch, strength, _decides(strength, rng))
 
@@ -160,14 +170,11 @@ def _decides(strength: float, rng: np.random.Generator) -> float:
     return float((draws > _DECIDES).mean())
 
 
-def _greedy(
-    pairs: Sequence[Pair], noise: Noise, rows: Sequence[list[int]], count: int = BATCH
-) -> tuple[list[int], float]:
-    """Choose some experiments, one after the other; return their places and the smallest λ of them together."""
+def _greedy(pairs: Sequence[Pair], noise: Noise) -> tuple[list[int], float]:
+    """Choose `BATCH` runs, one after the other; return their places and the smallest λ of them together."""
     chosen: list[int] = []
-    for _ in range(count):
-        made = [row for place in chosen for row in rows[place]]
-        tried = [_together(pairs, noise, made + more) for more in rows]
+    for _ in range(BATCH):
+        tried = [_together(pairs, noise, [*chosen, place]) for place in range(len(pairs[0].difference))]
         chosen.append(int(np.argmin([ndtr(-np.sqrt(strength) / 2).sum() for strength in tried])))
     return sorted(chosen), float(tried[chosen[-1]].min())
 
@@ -313,7 +320,7 @@ def new_runs(runs: Runs, before: set[str]) -> Flags:
     if not new.any():
         raise InputError(
             "all sessions of this table were there before; give the new runs a session of their own "
-            "(column session)"
+            "(column session), a new swim a name of its own (column run, or its file)"
         )
     return new
 
@@ -373,7 +380,7 @@ class Decision:
     """
 
     standings: tuple[Standing, ...]  # best first
-    new_runs: int  # how many there were
+    new_runs: int  # how many there were; of tracks how many swims
 
     @property
     def decided(self) -> str | None:

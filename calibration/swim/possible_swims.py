@@ -1,7 +1,7 @@
 """Which swims are possible: the one that was made again, other paths of the robot, and other robots on a path.
 
-Paths are closed ones as long as that of the swim, and twice as long. Another robot has a tail more or less, other
-tails, or turns its motor more slowly; its path is the square, in its own tail lengths. All are planned with the
+Paths are closed ones as long as that of the swim, and twice as long. Another robot turns its motor more slowly,
+has a tail more or less, or other tails; its path is the square, in its own tail lengths. All are planned with the
 shipped look-up table. What cannot be planned is left out.
 """
 
@@ -43,7 +43,7 @@ class PossibleSwim(NamedTuple):
 
 
 def possible_swims(robot: Robot, swims: Sequence[MeasuredSwim]) -> Iterator[PossibleSwim]:
-    """Plan swims of a robot and of others, with pictures as often as of the longest swim that was made."""
+    """Plan swims of a robot and of others, the cheapest first, seen as often as the longest one that was made."""
     swum = max(swims, key=lambda swim: float(swim.dwells.sum()))
     yield _possible(robot, _AGAIN, replace(swum, name=_NEXT, poses=np.zeros_like(swum.poses)), "")
     size = _path_length(swum) / robot.tail_length
@@ -80,14 +80,14 @@ def _possible(robot: Robot, path: str, swim: MeasuredSwim, change: str) -> Possi
 
 def _others(robot: Robot) -> Iterator[tuple[str, Robot]]:
     """List robots that differ in one number, and that number as in robot.toml."""
+    rpm = float(f"{_SLOWER * robot.motor_speed * 30 / math.pi:.3g}")
+    yield f"motor.speed_rpm={rpm:g}", replace(robot, motor_speed=rpm * math.pi / 30)
     for tails in (robot.tails - 1, robot.tails + 1):
         if 1 <= tails <= MOST_TAILS:
             yield f"tails.count={tails}", replace(robot, tails=tails)
     for factor in _LENGTHS:
         cm = float(f"{100 * factor * robot.tail_length:.3g}")
         yield f"tails.length_cm={cm:g}", replace(robot, tail_length=cm / 100)
-    rpm = float(f"{_SLOWER * robot.motor_speed * 30 / math.pi:.3g}")
-    yield f"motor.speed_rpm={rpm:g}", replace(robot, motor_speed=rpm * math.pi / 30)
 
 
 def _path_length(swim: MeasuredSwim) -> float:

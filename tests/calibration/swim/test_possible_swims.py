@@ -46,7 +46,7 @@ def test_paths_are_as_long_as_that_of_the_swim_and_others_robots_differ_in_one_n
     monkeypatch.setattr(possible, "_LONGER", 1e-3)  # too tight to be planned
     swims = list(possible.possible_swims(CONTROL, [along_a_line(CONTROL, 8 * CONTROL.tail_length)]))
     ways = [(each.settings["path"], each.settings["robot"]) for each in swims]
-    others = ["tails.count=3", "tails.length_cm=7.7", "tails.length_cm=15.4", "motor.speed_rpm=30.3"]
+    others = ["motor.speed_rpm=30.3", "tails.count=3", "tails.length_cm=7.7", "tails.length_cm=15.4"]
     paths = [("as swum", "as given"), ("circle:1.3l", "as given")]
     assert ways == [*paths, *(("square:2l", each) for each in others)]
     assert swims[0].settings["minutes"] == pytest.approx(400 / 60, abs=0.1)
@@ -125,12 +125,17 @@ def rivals(*slopes: float) -> tuple[Any, Any]:
 
 
 def test_a_swim_tells_apart_what_its_own_start_does_not_absorb() -> None:
-    """λ is that of the slope about its mean; all swims are listed, none is repeated."""
-    both, _ = rivals(0.0, 0.1, 0.3)
+    """λ is that of the slope about its mean; all swims are listed, none is repeated, the first that decides leads."""
+    both, _ = rivals(0.0, 0.1, 0.3, 0.4)
     runs, batch = next_runs(both)
-    assert [(run.settings["path"], run.repeats) for run in runs] == [("0.3", 1), ("0.1", 1), ("0.0", 1)]
+    assert [(run.settings["path"], run.repeats) for run in runs] == [
+        ("0.3", 1),
+        ("0.4", 1),
+        ("0.1", 1),
+        ("0.0", 1),
+    ]
     spread = ((TIME - TIME.mean()) ** 2).sum()
-    smallest = [slope**2 * spread / (1 + 1e-4 * slope**2 * spread) for slope in (0.3, 0.1, 0.0)]
+    smallest = [slope**2 * spread / (1 + 1e-4 * slope**2 * spread) for slope in (0.3, 0.4, 0.1, 0.0)]
     assert [run.separation for run in runs] == pytest.approx(smallest, rel=1e-3, abs=1e-3)
     assert batch.settings == ({"path": "0.3"},)
     assert (batch.worth_making, runs[-1].decides) == (True, 0.0)
