@@ -11,8 +11,8 @@ because B can be fitted again (T-optimal design, linearised). There is a λ for 
 single runs the smallest counts. How often the runs decide is found by drawing them at random. Source: Atkinson
 and Fedorov (1975).
 
-A swim is many rows, with a number of its own for what no other swim has, such as its start. These numbers are
-fitted anew, so they belong to J, with a wide distribution before or that of their tolerance in Cov.
+A swim is many rows, and has own numbers, such as its start, that are fitted to it alone. They are in J as well; in
+Cov they have a wide prior, or that of their tolerance.
 
 A batch is chosen one run after the other; of swims it is the best one. With equal odds the wrong one of two is
 chosen with the probability Φ(−√λ/2); the run is taken that makes the sum of these over all pairs least.

@@ -39,7 +39,7 @@ class PossibleSwim(NamedTuple):
 
     settings: dict[str, Any]  # column -> value
     robot: Robot  # as given
-    swim: MeasuredSwim  # at the place 0
+    swim: MeasuredSwim  # its flips and the times of its poses, which are not known: 0
 
 
 def possible_swims(robot: Robot, swims: Sequence[MeasuredSwim]) -> Iterator[PossibleSwim]:
