@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -9,6 +10,8 @@ import pandas as pd
 from calibration.findings.next_runs import Decision, read_explanations
 from calibration.findings.next_runs import decide as decide_between
 from calibration.laws.law_model import with_law
+from calibration.swim.measured_swim import PlanSource, is_track, read_swims
+from calibration.swim.swim_model import swim_model
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.verdict import Verdict
@@ -18,14 +21,21 @@ from sim.robot_rows import OneRobot, one_robot
 
 @checks_keywords
 def decide(
-    table: str | Path | pd.DataFrame, verdict: Verdict | str | Path, robot: OneRobot, *, jobs: int | None = None
+    table: str | Path | pd.DataFrame,
+    verdict: Verdict | str | Path,
+    robot: OneRobot,
+    *,
+    plan: PlanSource | None = None,
+    jobs: int | None = None,
 ) -> Decision:
     """Say which of several explanations new runs speak for.
 
     Args:
-        table: the measured table with the new runs, in sessions of their own.
+        table: the measured table with the new runs, in sessions of their own; or the track of a new swim, whose
+            file or `run` has another name than those before.
         verdict: an "ambiguous" verdict on the table before, or its verdict.json.
-        robot: the robot as given, its robot.toml, or the name of a preset.
+        robot: the robot as given, its robot.toml, or the name of a preset; of a swim the robot that swam.
+        plan: plan.json of the path that was swum, for a track, see `softflagella.calibrate`.
         jobs: threads; default all processors.
 
     Returns:
@@ -43,5 +53,9 @@ def decide(
         explanations, before = list(verdict.explanations), set(verdict.runs.session_names)
     else:
         explanations, before = read_explanations(verdict)
+    if plan is not None or is_track(table):
+        swum, _ = swim_model(one_robot(robot), read_swims(table, plan), jobs=jobs)
+        decision = decide_between(swum, explanations, before)
+        return replace(decision, new_runs=sum(swim.name not in before for swim in swum.runs.swims))
     model = SwimmerModel(one_robot(robot), read_measurements(table), jobs)
     return decide_between(model, explanations, before, with_law)

@@ -11,8 +11,11 @@ because B can be fitted again (T-optimal design, linearised). There is a λ for 
 single runs the smallest counts. How often the runs decide is found by drawing them at random. Source: Atkinson
 and Fedorov (1975).
 
-A batch is chosen one run after the other. With equal odds the wrong one of two is chosen with the probability
-Φ(−√λ/2); the run is taken that makes the sum of these over all pairs least.
+A swim is many rows, and has own numbers, such as its start, that are fitted to it alone. They are in J as well; in
+Cov they have a wide prior, or that of their tolerance.
+
+A batch is chosen one run after the other; of swims it is the best one. With equal odds the wrong one of two is
+chosen with the probability Φ(−√λ/2); the run is taken that makes the sum of these over all pairs least.
 
 Each explanation was fitted before the new runs were made, and gives them a density: Gaussian about its prediction,
 with covariance Σ + J Cov Jᵀ, J Cov Jᵀ the error of its own fit. The ratio of two densities, of all new runs
@@ -31,12 +34,13 @@ from pathlib import Path
 from typing import Any, NamedTuple, cast
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.special import ndtr
 
 from calibration.attribution.hypothesis import Hypothesis
 from calibration.linear.gls import Noise
 from calibration.statistics.forward import derivatives
-from calibration.statistics.statistical_model import Experiment, ForwardModel, start_values
+from calibration.statistics.statistical_model import Experiment, ForwardModel, apply_step, parameter, start_values
 from calibration.table.runs import Runs
 from common.arrays import Flags, Floats
 from common.errors import InputError
@@ -51,8 +55,11 @@ _DRAWS = 4000
 _DECIDES = 3.84  # difference of χ² at which one of the two is chosen
 _PROPOSED = 3  # single settings
 _WANTED = 0.9  # share of draws that should decide
+_ENOUGH = 13.1  # λ at which they do
 _MOST_REPEATS = 16
 _MOST_RIVALS = 4
+_WIDE = 1e3  # standard deviation of a number of new runs' own without a tolerance, in typical sizes or logarithms
+_PASSES = 3  # of a fit of these numbers
 
 
 @dataclass(frozen=True)
@@ -105,34 +112,53 @@ class Pair(NamedTuple):
 
     difference: Floats  # of their predictions, (m, k)
     J: Floats  # (m, k, p) derivatives of the wrong one
-    covariance: Floats  # (p, p) of its fit
+    covariance: Floats  # (p, p) of its fit, see `_with_own`
 
 
 def next_runs(rivals: Sequence[Hypothesis], *, seed: int = 0) -> tuple[tuple[NextRun, ...], Batch]:
-    """Find the best experiments to tell (the first four) rivals apart, best first, and the best `BATCH` runs."""
+    """Find the best experiments to tell (the first four) rivals apart, best first, and the best `BATCH` runs.
+
+    Of experiments of several rows, such as swims, all are listed, the cheapest first of those that decide in
+    `_WANTED` of cases. None is repeated, and the batch is the best one. The numbers of its own take the place of
+    what a session shifts.
+
+    Raises:
+        InputError: a run cannot be simulated; of swims none can.
+    """
     told_apart = rivals[:_MOST_RIVALS]
     fits = [rival.fitted for rival in told_apart]
-    possible = [cast(Experiment, rival.model).possible() for rival in told_apart]
-    settings = possible[0][1]  # those of all of them
-    sides = [derivatives(model, fit.parameters, fit.names) for (model, _), fit in zip(possible, fits, strict=True)]
-    pairs = [
-        Pair(true[0] - wrong[0], wrong[1], again.covariance)
-        for (_, true), (again, wrong) in itertools.permutations(zip(fits, sides, strict=True), 2)
-    ]
-    noise = Noise(
-        np.mean([f.noise.run_covariance for f in fits], 0),
-        np.mean([np.asarray(f.noise.session_ratio) for f in fits], 0),
-    )
-    alone = np.array([_together(pairs, noise, [place]).min() for place in range(len(settings))])
+    distinct = {id(rival.model): cast(Experiment, rival.model) for rival in told_apart}
+    possible = {key: model.possible() for key, model in distinct.items()}
+    first, settings = next(iter(possible.values()))  # settings are those of all of them
+    sides = []
+    for rival, fit in zip(told_apart, fits, strict=True):
+        model, before = possible[id(rival.model)][0], Explanation.of(rival)
+        names, covariance = _with_own(model, before)
+        at = {**start_values(model), **fit.parameters}
+        sides.append((*derivatives(model, at, names), covariance))
+    pairs = [Pair(true[0] - wrong[0], *wrong[1:]) for true, wrong in itertools.permutations(sides, 2)]
+    solved = np.array([np.isfinite(prediction).all(1) & np.isfinite(J).all((1, 2)) for prediction, J, _ in sides])
+    experiments = [np.flatnonzero(first.runs.condition == place) for place in range(len(settings))]
+    kept = [place for place, of in enumerate(experiments) if solved[:, of].all()]
+    if not kept:
+        raise InputError("no run that is possible can be simulated")
+    settings, rows = [settings[place] for place in kept], [experiments[place].tolist() for place in kept]
+    whole = max(map(len, rows)) > 1
+    ratio = np.mean([np.asarray(f.noise.session_ratio) for f in fits], 0)
+    noise = Noise(np.mean([f.noise.run_covariance for f in fits], 0), 0.0 if whole else ratio)
+    alone = np.array([_together(pairs, noise, of).min() for of in rows])
     runs = []
     rng = np.random.default_rng(seed)
-    for place in np.argsort(-alone)[:_PROPOSED].tolist():
-        for repeats in (1, 2, 4, 8, _MOST_REPEATS):
-            strength = float(_together(pairs, noise, [place] * repeats).min())
+    order = np.argsort(-np.minimum(alone, _ENOUGH if whole else math.inf), kind="stable")
+    for place in order[: None if whole else _PROPOSED].tolist():
+        for repeats in (1,) if whole else (1, 2, 4, 8, _MOST_REPEATS):
+            strength = float(_together(pairs, noise, rows[place] * repeats).min())
             decides = _decides(strength, rng)
             if decides >= _WANTED:
                 break
         runs.append(NextRun(settings[place], repeats, strength, decides))
+    if whole:
+        return tuple(runs), Batch((runs[0].settings,), runs[0].separation, runs[0].decides)
     chosen, strength = _greedy(pairs, noise)
     batch = tuple(settings[place] for place in chosen)
     return tuple(runs), Batch(batch, strength, _decides(strength, rng))
@@ -154,14 +180,58 @@ def _greedy(pairs: Sequence[Pair], noise: Noise) -> tuple[list[int], float]:
 
 
 def _together(pairs: Sequence[Pair], noise: Noise, places: list[int]) -> Floats:
-    """Compute λ of several runs made together, for every pair."""
-    spread = noise.covariance(np.zeros(len(places), dtype=np.int64))  # one session
-    strengths = []
-    for pair in pairs:
-        slopes = pair.J[places].reshape(-1, pair.J.shape[-1])
-        d = pair.difference[places].ravel()
-        strengths.append(float(d @ np.linalg.solve(spread + slopes @ pair.covariance @ slopes.T, d)))
-    return np.array(strengths)
+    """Compute λ of several rows made together, for every pair."""
+    white = noise.whitener(np.zeros(len(places), dtype=np.int64))  # one session
+    tables = (np.concatenate([pair.difference[..., None], pair.J], -1)[places] for pair in pairs)
+    whitened = (white(table) for table in tables)
+    return np.array([
+        _fit_again(table[:, 0], table[:, 1:], _root(pair.covariance)).left
+        for table, pair in zip(whitened, pairs, strict=True)
+    ])  # fmt: skip
+
+
+class FittedAgain(NamedTuple):
+    """What p numbers that were known with a covariance C become with new runs."""
+
+    left: float  # rᵀ (1 + J C Jᵀ)⁻¹ r
+    log_determinant: float  # of 1 + J C Jᵀ
+    scores: Floats  # (p,) by how much they change, in the axes of `_root`
+
+
+def _fit_again(residual: Floats, slopes: Floats, root: Floats, scores: Floats | float = 0.0) -> FittedAgain:
+    """Fit numbers to white rows again: with C as rows, which needs no large matrix.
+
+    Args:
+        residual: (n,) at some scores.
+        slopes: J, (n, p).
+        root: of C, (p, p).
+        scores: (p,) by which the numbers are off already, in the axes of the root.
+    """
+    count = len(root)
+    orthogonal, upper = np.linalg.qr(np.concatenate([slopes @ root, np.eye(count)]))
+    target = np.concatenate([residual, np.zeros(count) - scores])
+    explained = orthogonal.T @ target
+    left = target - orthogonal @ explained
+    return FittedAgain(
+        float(left @ left),
+        2 * float(np.log(np.abs(np.diag(upper))).sum()),
+        np.asarray(np.linalg.solve(upper, explained)),
+    )
+
+
+def _root(covariance: Floats) -> Floats:
+    """Compute F, F Fᵀ = C, (p, p), whatever the units of its rows."""
+    sigma = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
+    sizes, axes = np.linalg.eigh(covariance / np.outer(sigma, sigma))
+    return np.asarray(sigma[:, None] * axes * np.sqrt(np.maximum(sizes, 0.0)))
+
+
+def _with_own(model: ForwardModel, before: Explanation) -> tuple[list[str], Floats]:
+    """List what new runs fit again, and its covariance: that of an explanation, and wide of their own numbers."""
+    own = [p for p in (*model.coefficients, *model.nuisances) if p.of_these_runs]
+    widths = [p.sigma or _WIDE * (1.0 if p.logarithmic else abs(p.typical)) for p in own]
+    names = [*before.parameters, *(p.name for p in own)]
+    return names, block_diag(before.covariance, np.diag(np.square(widths)))
 
 
 @dataclass(frozen=True)
@@ -250,7 +320,7 @@ def new_runs(runs: Runs, before: set[str]) -> Flags:
     if not new.any():
         raise InputError(
             "all sessions of this table were there before; give the new runs a session of their own "
-            "(column session)"
+            "(column session), a new swim a name of its own (column run, or its file)"
         )
     return new
 
@@ -281,12 +351,19 @@ def standings(
                 f"{explanation.title}: these runs cannot test {', '.join(missing)}; keep every column of the "
                 "table before"
             )
-        parameters = {**known, **explanation.parameters}
-        prediction, J = derivatives(subject, parameters, list(explanation.parameters))
-        slopes = J[new].reshape(-1, J.shape[-1])
-        spread = explanation.noise.covariance(data.session[new]) + slopes @ explanation.covariance @ slopes.T
-        residual = (data.y - prediction)[new].ravel()
-        scores.append(float(residual @ np.linalg.solve(spread, residual) + np.linalg.slogdet(spread)[1]))
+        names, covariance = _with_own(subject, explanation)
+        session = data.session[new]
+        whiten = explanation.noise.whitener(session, along=data.along[new])
+        root, at = _root(covariance), {**known, **explanation.parameters}
+        changed: Floats = np.zeros(len(names))
+        for _ in range(_PASSES if len(names) > len(explanation.parameters) else 1):
+            prediction, J = derivatives(subject, at, names)
+            table = whiten(np.concatenate([(data.y - prediction)[..., None], J], -1)[new])
+            again = _fit_again(table[:, 0], table[:, 1:], root, changed)
+            changed = changed + again.scores
+            at = apply_step([parameter(subject, name) for name in names], at, root @ again.scores)
+        scale = explanation.noise.log_determinant(session, data.along[new])
+        scores.append(again.left + again.log_determinant + scale)
     best = min(scores)
     standing = [Standing(e.title, score - best) for e, score in zip(explanations, scores, strict=True)]
     return sorted(standing, key=lambda s: s.behind)
@@ -303,7 +380,7 @@ class Decision:
     """
 
     standings: tuple[Standing, ...]  # best first
-    new_runs: int  # how many there were
+    new_runs: int  # how many there were; of tracks how many swims
 
     @property
     def decided(self) -> str | None:

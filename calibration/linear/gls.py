@@ -109,12 +109,12 @@ class Noise:
 
         return whiten
 
-    def covariance(self, session: Integers) -> Floats:
-        """Compute Σ of the runs of `session` (n,), (n k, n k)."""
-        axes = np.linalg.inv(inverse_root(self.run_covariance))
-        shifts = (axes * np.broadcast_to(self.session_ratio, len(axes))) @ axes.T
-        together = session[:, None] == session
-        return np.asarray(np.kron(np.eye(len(session)), self.run_covariance) + np.kron(together, shifts))
+    def log_determinant(self, session: Integers, along: Floats) -> float:
+        """Compute ln |Σ| of the runs of `session` (n,); see `Regression` for `along`."""
+        sizes = averaging_rows(session, along)[1]
+        ratio = np.broadcast_to(self.session_ratio, len(self.run_covariance))
+        of_runs = len(session) * np.linalg.slogdet(self.run_covariance)[1]
+        return float(of_runs + np.log1p(sizes[:, None] * ratio).sum())
 
 
 class Regression:

@@ -256,7 +256,7 @@ class FunctionModel:
         for name, own in self.own.items():
             table = table.drop(columns=name).merge(pd.Series(own, name=name, dtype=float), how="cross")
         table = table.drop_duplicates(names := [name.removeprefix("ln ") for name in self.runs.input_names])
-        runs = self.runs.subset(table.pop("row").to_numpy())
+        runs = replace(self.runs.subset(table.pop("row").to_numpy()), condition=np.arange(len(table)))
         if not any(number.per == "session" for number in self.model.numbers):
             runs = replace(runs, session=np.zeros(len(runs), dtype=np.int64), session_names=("next",))
         values = {name: table[name].to_numpy().astype(old.dtype) for name, old in self.columns.items()}

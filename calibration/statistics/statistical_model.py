@@ -127,7 +127,10 @@ class Experiment(ForwardModel, Protocol):
         ...
 
     def possible(self) -> tuple[ForwardModel, list[dict[str, Any]]]:
-        """Return a model of runs that can be made next, and their settings."""
+        """Return a model of runs that can be made next, and their settings, the cheapest first.
+
+        The rows of one setting share a condition, by its place. They may be NaN where they cannot be simulated.
+        """
         ...
 
 

@@ -31,6 +31,7 @@ STARTS = ("start_x", "start_y", "start_heading")
 _BESIDE, _FARTHEST = 0.05, 0.5  # of the place of a marker, in tail lengths: σ, and bound
 _LATE = {True: 0.1, False: 1.0}  # σ of the clock [s], by whether it is that of the poses
 _FASTEST = 0.05  # m/s, of a current
+_OWN: dict[str, Any] = {"of_these_runs": True}
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class Sight:
         """Currents and starts."""
         ends = -_FASTEST, _FASTEST
         currents = [
-            Parameter(name, f"current in the tank along {axis}", 0.0, ends, 1e-4, unit="cm/s", shown=100.0)
+            Parameter(name, f"current in the tank along {axis}", 0.0, ends, 1e-4, unit="cm/s", shown=100.0, **_OWN)
             for name, axis in zip(CURRENT, "xy", strict=True)
         ]
         places = enumerate(self.runs.part_names)
@@ -56,12 +57,14 @@ class Sight:
         """Marker and clock."""
         length, far = self.runs.length, _FARTHEST * self.runs.length
         known = all(swim.clock_known for swim in self.runs.swims)
-        metre: dict[str, Any] = {"unit": "cm", "shown": 100.0, "sigma": _BESIDE * length}
+        metre: dict[str, Any] = {"unit": "cm", "shown": 100.0, "sigma": _BESIDE * length, **_OWN}
         title = "marker {} the head's centre"
         return (
             Parameter(AHEAD, title.format("ahead of"), 0.0, (-far, far), 1e-3, **metre),
             Parameter(LEFT, title.format("left of"), 0.0, (-far, far), 1e-3, **metre),
-            Parameter(CLOCK, "motor later than the poses", 0.0, (-5.0, 5.0), 0.05, unit="s", sigma=_LATE[known]),
+            Parameter(
+                CLOCK, "motor later than the poses", 0.0, (-5.0, 5.0), 0.05, unit="s", sigma=_LATE[known], **_OWN
+            ),
         )
 
     def without(self, parameters: Parameters) -> dict[str, Any]:
@@ -84,7 +87,7 @@ class Sight:
         for number, column, of in zip(STARTS, swim.poses.T, (metre, metre, angle), strict=True):
             value, room = float(np.interp(at, swim.time, column)), 5 * (self.runs.length if of is metre else 1.0)
             title, ends = f"{number.replace('_', ' ')}, {name}", (value - room, value + room)
-            own: dict[str, Any] = {"of_these_runs": True, "of_group": (number, name)}
+            own: dict[str, Any] = {"of_group": (number, name), **_OWN}
             starts.append(Parameter(f"{number}: {name}", title, value, ends, **own, **of))
         return starts
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -16,10 +17,12 @@ import numpy as np
 
 from calibration.statistics.budget import count_predictions
 from calibration.statistics.forward import central
-from calibration.statistics.statistical_model import ForwardModel, Parameter, Parameters, Predict, start_values
+from calibration.statistics.statistical_model import Parameter, Parameters, Predict, start_values
 from calibration.swim.course import Base, Swimming, Vehicles
 from calibration.swim.free_vehicle import with_noise
 from calibration.swim.measured_swim import MeasuredSwim
+from calibration.swim.pose_noise import Sizes
+from calibration.swim.possible_swims import PossibleSwim, PossibleSwims, possible_swims
 from calibration.swim.sight import Sight
 from calibration.swim.swim_runs import SwimRuns, runs_of_swims
 from calibration.swimmer.influences import HEADING, TRACKED_POINT
@@ -49,7 +52,8 @@ class SwimModel:
 
     @property
     def nuisances(self) -> tuple[Parameter, ...]:
-        return (*self.robot.nuisances, *self.sight.nuisances)
+        askew = (replace(p, of_these_runs=p.name == HEADING) for p in self.robot.nuisances)
+        return (*askew, *self.sight.nuisances)
 
     @property
     def effects(self) -> tuple[Parameter, ...]:
@@ -67,9 +71,27 @@ class SwimModel:
         """Return where a vehicle that is fitted to the poses begins."""
         return {**start, **self.began}
 
-    def possible(self) -> tuple[ForwardModel, list[dict[str, Any]]]:
-        """Refuse: a swim is planned."""
-        raise InputError("no settings make a swim; plan a path")
+    def possible(self) -> tuple[PossibleSwims, list[dict[str, Any]]]:
+        """Return swims that can be made next (`calibration.swim.possible_swims`), seen as these were."""
+        models, settings = [], []
+        for each in possible_swims(self.robot.robot, self.runs.swims):
+            with suppress(InputError):  # where a robot cannot be simulated
+                models.append(self._next(each))
+                settings.append(each.settings)
+        return PossibleSwims(tuple(models)), settings
+
+    def _next(self, of: PossibleSwim) -> SwimModel:
+        """Make the model of a swim, in the noise of these."""
+        noise = self.runs.noise_of_poses
+        assert noise is not None
+        runs, _ = runs_of_swims([of.swim], of.robot.tail_length)
+        inner = SwimmerModel(of.robot, _both_directions(of.robot), self.robot.jobs)
+        model = replace(self, robot=inner, sight=Sight(runs), runs=runs, began={})
+        start = start_values(model)
+        units = np.array([self.runs.length / of.robot.tail_length, 1.0])
+        sizes = noise.sizes._replace(**{name: units * getattr(noise.sizes, name) for name in Sizes._fields[:3]})
+        runs = runs.in_noise(sizes, model.predict([start])[0])
+        return replace(model, sight=Sight(runs), runs=runs)
 
     def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
         """Predict (P, n, 3), see `ForwardModel`."""

@@ -11,6 +11,7 @@ import pytest
 from calibration.laws.search import LinearModels
 from calibration.linear.gls import UNKNOWN_RATIO, Noise, Regression, repeat_covariance
 from common.arrays import Floats
+from tests.oracles.dense_noise import dense_covariance
 
 SESSION = np.repeat([0, 1, 2, 3], [6, 8, 6, 4])
 CONDITION = np.arange(len(SESSION)) // 2
@@ -38,7 +39,7 @@ def dense(residual: Floats, share: Floats, table: Floats) -> tuple[float, Floats
     """Fit columns (n, k, q) with ρ by the definitions; return the deviance and all weights."""
     run = repeat_covariance(residual, CONDITION)
     flat = table.reshape(residual.size, -1)
-    covariance = Noise(run, share).covariance(SESSION)
+    covariance = dense_covariance(Noise(run, share), SESSION)
     inverse = np.linalg.inv(covariance)
     normal = flat.T @ inverse @ flat + np.diag(np.r_[PRECISION, np.zeros(flat.shape[1] - len(PRECISION))])
     toward = flat.T @ inverse @ residual.ravel()

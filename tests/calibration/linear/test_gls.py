@@ -22,6 +22,7 @@ from calibration.statistics.study import Study, middle_session
 from calibration.table.runs import features
 from common.arrays import Floats
 from tests.calibration.toy_tables import fit_all, toy_swimmer, toy_table
+from tests.oracles.dense_noise import dense_covariance
 
 SESSION = np.array([0, 0, 1, 1, 1, 2, 2, 2])
 SCALE = np.sqrt([1.0, 0.1, 1.0, 0.4, 0.02, 1.0, 2.0, 1.0])
@@ -85,8 +86,10 @@ def test_whitener_is_the_inverse_root_of_the_block_covariance(scale: Floats | No
     noise = Noise(root @ root.T + np.eye(3), np.array([0.7, 0.0, 0.3]))
     factors = np.zeros((8, 8)) if scale is None else np.diag(scale**-2) - np.eye(8)
     W = noise.whitener(SESSION, scale)(np.eye(24).reshape(8, 3, 24))
-    covariance = noise.covariance(SESSION) + np.kron(factors, noise.run_covariance)
+    covariance = dense_covariance(noise, SESSION) + np.kron(factors, noise.run_covariance)
     assert W @ covariance @ W.T == pytest.approx(np.eye(24), abs=1e-10)
+    if scale is None:
+        assert noise.log_determinant(SESSION, np.ones(8)) == pytest.approx(np.linalg.slogdet(covariance)[1])
 
 
 def test_noise_is_recovered_from_repeats_and_sessions() -> None:
@@ -169,7 +172,7 @@ def test_lengths_are_those_of_a_dense_covariance() -> None:
     flat = fitted.jacobian.reshape(used.size * 5, -1)
     bound = [p.sigma is not None for p in fitted.fitted]
 
-    covariance = replace(fitted.noise, session_ratio=1.0).covariance(model.runs.session)
+    covariance = dense_covariance(replace(fitted.noise, session_ratio=1.0), model.runs.session)
     for p, column in zip(fitted.fitted, flat.T, strict=True):
         covariance += (p.sigma or 0.0) ** 2 * np.outer(column, column)
     white = np.linalg.inv(np.linalg.cholesky(covariance))

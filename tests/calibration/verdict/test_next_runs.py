@@ -75,7 +75,7 @@ def test_the_true_explanation_is_seldom_given_up() -> None:
     def model(y: np.ndarray, *outputs: str) -> Any:
         """Its parameter's name says which prediction is meant."""
         known = tuple(Parameter(name, name, 0.0, (-9.0, 9.0), 1.0) for name in predictions)
-        runs = SimpleNamespace(y=y, session=np.zeros(n, int), outputs=outputs or ("a", "b"))
+        runs = SimpleNamespace(y=y, session=np.zeros(n, int), along=np.ones(n), outputs=outputs or ("a", "b"))
         return SimpleNamespace(
             runs=runs, coefficients=known, nuisances=(), effects=(),
             linearised=lambda at, along, **_: lambda sets: np.array(
@@ -106,7 +106,7 @@ def test_an_explanation_is_given_up_where_another_is_25_times_as_likely(ratio: f
     known = tuple(Parameter(name, name, 0.0, (-9.0, 9.0), 1.0) for name in "AB")
     predictions = {"A": 0.0, "B": math.sqrt(2 * math.log(ratio))}
     model: Any = SimpleNamespace(
-        runs=SimpleNamespace(y=np.zeros((1, 1)), session=np.zeros(1, int), outputs=("y",)),
+        runs=SimpleNamespace(y=np.zeros((1, 1)), session=np.zeros(1, int), along=np.ones(1), outputs=("y",)),
         coefficients=known, nuisances=(), effects=(),
         linearised=lambda at, along, **_: lambda sets: np.full((len(sets), 1, 1), predictions[along[0].name]),
     )  # fmt: skip

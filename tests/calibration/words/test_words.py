@@ -137,6 +137,42 @@ def test_rivals_are_told_apart_by_runs_that_are_worth_making_and_a_command() -> 
     assert "`" not in seen
 
 
+@pytest.mark.parametrize(
+    ("robot", "path_decides", "decides", "said"),
+    [
+        ("as given", 0.7, 0.7, "Let the robot swim as this command plans: `softflagella plan circle:2l`."),
+        ("tails.count=3", 0.02, 0.9, "the best one, circle:2l, decides in 2 % of cases. Let another robot, with "
+         "`tails.count=3`, swim as this command plans: `softflagella plan square:2l`."),
+        ("tails.count=3", 0.6, 0.9, "Let another robot, with `tails.count=3`, swim"),
+        ("tails.count=3", 0.02, 0.1, "Do not let the robot swim again"),
+    ],
+    ids=["a path", "no path", "a path, but less often", "nothing"],
+)  # fmt: skip
+def test_the_swim_that_decides_is_named_with_its_command(
+    robot: str, path_decides: float, decides: float, said: str
+) -> None:
+    circle = {"path": "circle:2l", "robot": "as given", "minutes": 21.2, "plan": "softflagella plan circle:2l"}
+    square = {"path": "square:2l", "robot": robot, "minutes": 19.9, "plan": "softflagella plan square:2l"}
+    shares = [(square, decides), (circle, path_decides)]
+    best, *_ = listed = [circle] if robot == "as given" else [square, circle]
+    record = stored(
+        "ambiguous",
+        next_batch={"runs": [best], "decides": decides, "separation": 9.0, "worth_making": decides >= SELDOM},
+        next_runs=[
+            {**swim, "repeats": 1, "separation": 9.0, "decides": share, "worth_making": share >= SELDOM}
+            for swim, share in shares if swim in listed
+        ],
+    )  # fmt: skip
+    steps = next_steps(record)
+    (place,) = (i for i, step in enumerate(steps) if said in step)
+    assert ("No path tried" in steps[place]) == (robot != "as given" and path_decides < SELDOM <= decides)
+    assert ("softflagella calibration decide TRACK" in " ".join(steps)) == (decides >= SELDOM)
+    seen = in_report(record)
+    assert "path robot minutes plan decides" in seen
+    assert f"circle:2l as given 21.2 softflagella plan circle:2l {path_decides:.0%}".replace("%", " %") in seen
+    assert "runs of the table" not in " ".join(steps)
+
+
 def test_a_pull_that_is_not_taken_to_be_wrong_has_its_reason() -> None:
     """And a report without a claim compares no model with itself."""
     first, *others = stored("none")["numbers_as_given"]
