@@ -115,7 +115,18 @@ def examine(
                 after_first(wanted, clock() - began)
                 after_first = None
         examined.append(candidate)
-    return examined
+    return _with_look_alikes(examined)
+
+
+def _with_look_alikes(examined: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Keep effects that fit as well as a kept one, and miss its gain over left-out sessions by chance."""
+    best = min((penalised_deviance(c) for c in examined if c.kept), default=-math.inf)
+    return [
+        replace(c, reason=Reason.KEPT)
+        if c.reason is Reason.NOT_PREDICTIVE and penalised_deviance(c) - best < INDISTINGUISHABLE
+        else c
+        for c in examined
+    ]
 
 
 def _fitted(study: Study, base: Fit, candidate: Hypothesis, second: float, *, local: bool) -> Hypothesis:
