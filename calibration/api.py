@@ -14,7 +14,9 @@ from calibration.swim.measured_swim import PlanSource, is_track, read_swims
 from calibration.swim.swim_model import swim_model
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
+from calibration.table.reader import open_table
 from calibration.verdict.verdict import Verdict
+from common.errors import naming
 from common.keywords import checks_keywords
 from sim.robot_rows import OneRobot, one_robot
 
@@ -53,9 +55,12 @@ def decide(
         explanations, before = list(verdict.explanations), set(verdict.runs.session_names)
     else:
         explanations, before = read_explanations(verdict)
-    if plan is not None or is_track(table):
-        swum, _ = swim_model(one_robot(robot), read_swims(table, plan), jobs=jobs)
+    file = None if isinstance(table, pd.DataFrame) else table
+    with naming(table):
+        measured = open_table(table)
+    if plan is not None or is_track(measured):
+        swum, _ = swim_model(one_robot(robot), read_swims(measured, plan, file=file), jobs=jobs)
         decision = decide_between(swum, explanations, before)
         return replace(decision, new_runs=sum(swim.name not in before for swim in swum.runs.swims))
-    model = SwimmerModel(one_robot(robot), read_measurements(table), jobs)
+    model = SwimmerModel(one_robot(robot), read_measurements(measured, file=file), jobs)
     return decide_between(model, explanations, before, with_law)

@@ -115,10 +115,10 @@ def examine(
                 after_first(wanted, clock() - began)
                 after_first = None
         examined.append(candidate)
-    return _with_look_alikes(examined)
+    return with_look_alikes(examined)
 
 
-def _with_look_alikes(examined: Sequence[Hypothesis]) -> list[Hypothesis]:
+def with_look_alikes(examined: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Keep effects that fit as well as a kept one, and miss its gain over left-out sessions by chance."""
     best = min((penalised_deviance(c) for c in examined if c.kept), default=-math.inf)
     return [

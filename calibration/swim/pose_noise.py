@@ -79,7 +79,8 @@ class PoseNoise:
     def _decay(self) -> Floats:
         """The share of the slow noise that is left from the pose before, (n,); below 0 where a part begins."""
         same = np.append(False, np.diff(self.part) == 0)
-        return np.where(same, np.exp(-np.diff(self.time, prepend=self.time[0]) / self.sizes.tau), -1.0)
+        since = np.where(same, np.diff(self.time, prepend=self.time[0]), 0.0)  # clocks of swims may go back
+        return np.where(same, np.exp(-since / self.sizes.tau), -1.0)
 
     @cached_property
     def _filter(self) -> tuple[Floats, Floats]:

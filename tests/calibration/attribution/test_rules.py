@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from calibration.attribution.effects import with_look_alikes
 from calibration.attribution.hypothesis import Evidence, Hypothesis, Origin, Reason, SetErrors
 from calibration.attribution.left_out import PairedGain
 from calibration.attribution.rules import RULES, Stage, Trial, doubted, judge
@@ -63,6 +64,17 @@ def test_a_rule_is_of_some_origins(origin: Origin, evidence: dict[str, object], 
     given, trial = claim()
     trial = replace(trial, single=10.0)
     assert judge(replace(given, origin=origin, evidence=Evidence(**evidence)), trial, RULES).reason is reason
+
+
+@pytest.mark.slow
+def test_what_fits_as_well_as_a_claim_is_its_rival() -> None:
+    """An effect that misses the gain on left-out sessions by chance is kept beside one that does not."""
+    given, _ = claim()
+    missed = replace(given, reason=Reason.NOT_PREDICTIVE)
+    worse = replace(missed, fit=replace(given.fitted, deviance=given.fitted.deviance + 7))
+    null = replace(given, reason=Reason.INCLUDES_NULL)
+    assert [h.kept for h in with_look_alikes([given, missed, worse, null])] == [True, True, False, False]
+    assert not any(h.kept for h in with_look_alikes([missed, worse]))
 
 
 @pytest.mark.slow

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -54,6 +56,13 @@ def test_of_some_poses_the_noise_is_a_part_of_it() -> None:
     rows = (np.arange(60) < 30) | ((np.arange(60) >= 40) & (np.arange(60) < 50))
     picked = np.repeat(rows, 3)
     np.testing.assert_allclose(covariance(noise.of(rows)), covariance(noise)[np.ix_(picked, picked)])
+
+
+@pytest.mark.filterwarnings("error")
+def test_each_swim_has_a_clock_of_its_own() -> None:
+    noise, poses = noise_of(60, SIZES, first=40), np.random.default_rng(2).normal(size=(60, 3, 1))
+    anew = replace(noise, time=noise.time - 1e5 * noise.part)
+    np.testing.assert_allclose(anew.whiten(poses), noise.whiten(poses), rtol=1e-8)
 
 
 def test_without_steps_poses_are_compared_and_with_large_ones_their_changes() -> None:
