@@ -31,6 +31,7 @@ from sim.motion.steady import steady
 from sim.solve.march import YAW, X, Y
 
 _TOLERANCE, _MESHES = 1e-4, (4, 6)  # of the curves; differences of them count
+_COARSE = 1e-3  # tolerance of non-local effects
 _END = 1e-9  # of a dwell
 _STEP = 0.02  # of `_size`, for slopes of lags
 _FAR = 0.1  # of `_distance`, from which slopes are simulated again
@@ -61,11 +62,12 @@ class Vehicles:
     """Makes vehicles of robots: their twists are solved for, their lags simulated.
 
     Lags take longer than steady motions, so what was simulated is kept. For derivatives, the lags of robots close
-    to one are its own, and their slopes times the change. These are simulated at a robot not far away.
+    to one are its own, and their slopes times the change. Slopes are simulated at a robot not far away. In
+    non-local effects, with which a flip can take minutes, lags are linear.
     """
 
-    known: dict[tuple[_Columns, int], Lags] = field(default_factory=dict)  # by robot and direction of the motor
-    slopes: dict[tuple[_Columns, str, int], Lags] = field(default_factory=dict)  # by column, too
+    known: dict[tuple[_Columns, int, float], Lags] = field(default_factory=dict)  # by robot, direction, tolerance
+    slopes: dict[tuple[_Columns, str, int], Lags] = field(default_factory=dict)  # by robot, column, direction
     centres: list[_Columns] = field(default_factory=list)  # robots of slopes
 
     def swimming(
@@ -92,71 +94,88 @@ class Vehicles:
         forward = {**columns, "omega_bar": np.abs(columns["omega_bar"])}
         robots = [dict(zip(forward, row, strict=True)) for row in np.stack([*forward.values()], 1).tolist()]
         wanted = [(_at_work(robot), sense) for robot, sense in zip(robots, directions.tolist(), strict=True)]
-        lags = self._close(_at_work(robots[pairs[0, 0]]), wanted) if close else self._simulated(wanted)
+        lags = self._lags(wanted, robots[pairs[0, 0]] if close else None)
         return [
             Swimming(_vehicle(twist[pair], [lags[place] for place in pair]), robots[pair[0]], unit, size)
             for pair, unit, size in zip(pairs.tolist(), time.tolist(), length.tolist(), strict=True)
         ]
 
-    def _simulated(self, wanted: Sequence[tuple[_Columns, int]]) -> list[Lags]:
-        """Simulate the lags of robots, each in one direction of its motor, unless they are known.
+    def _lags(self, wanted: Sequence[tuple[_Columns, int]], first: Mapping[str, float] | None) -> list[Lags]:
+        """Find the lags of robots, each in one direction of its motor; with a `first`, all are close to it.
 
         Raises:
             InputError: a flip breaks down.
         """
-        if new := [each for each in dict.fromkeys(wanted) if each not in self.known]:
+        near = [_at_work(dict(robot) if first is None else first, local=True) for robot, _ in wanted]
+        simulated = self._simulated([(robot, sense) for robot, (_, sense) in zip(near, wanted, strict=True)])
+        changes = [_change(robot, other) for robot, (other, _) in zip(near, wanted, strict=True)]
+        centre = self._centre(near[0])
+        moved = [
+            {name: (self.centres[0] if _nonlocal(name) else centre, name, sense) for name in change}
+            for change, (_, sense) in zip(changes, wanted, strict=True)
+        ]
+        self._learn([*dict.fromkeys(key for keys in moved for key in keys.values())])
+        return [
+            Lags(*(
+                part + sum(change[name] * self.slopes[key][place] for name, key in keys.items())
+                for place, part in enumerate(lags)
+            ))
+            for lags, change, keys in zip(simulated, changes, moved, strict=True)
+        ]  # fmt: skip
+
+    def _simulated(self, wanted: Sequence[tuple[_Columns, int]], tolerance: float = _TOLERANCE) -> list[Lags]:
+        """Simulate the lags of robots, each in one direction of its motor, unless they are known."""
+        if new := [each for each in dict.fromkeys(wanted) if (*each, tolerance) not in self.known]:
             robots = [dict(robot) for robot, _ in new]
             names = sorted({name for robot in robots for name in robot})
             columns = {name: np.array([robot.get(name, _null(name)) for robot in robots]) for name in names}
             columns["omega_bar"] = columns["omega_bar"] * np.array([sense for _, sense in new])
-            curves = responses(Groups.from_columns(check_columns(columns)), tolerance=_TOLERANCE, meshes=_MESHES)
+            curves = responses(Groups.from_columns(check_columns(columns)), tolerance=tolerance, meshes=_MESHES)
             if curves.failed.any():
                 raise InputError(_BROKE)
             tables = lag_table(curves.lag, curves.memory, curves.before), resampled(curves.rest)
-            self.known.update((each, Lags(*of)) for each, *of in zip(new, *tables, strict=True))
-        return [self.known[each] for each in wanted]
+            self.known.update(((*each, tolerance), Lags(*of)) for each, *of in zip(new, *tables, strict=True))
+        return [self.known[*each, tolerance] for each in wanted]
 
-    def _close(self, first: _Columns, wanted: Sequence[tuple[_Columns, int]]) -> list[Lags]:
-        """Find the lags of robots close to a first one."""
-        centre = min(self.centres, key=lambda other: _distance(other, first), default=first)
-        if centre not in self.centres or _distance(centre, first) > _FAR:
-            centre = first
-            self.centres.append(first)
-        changes = [_change(first, robot) for robot, _ in wanted]
-        moved = {(name, sense) for change, (_, sense) in zip(changes, wanted, strict=True) for name in change}
-        self._learn(centre, sorted(moved))
-        at = dict(zip((1, -1), self._simulated([(first, 1), (first, -1)]), strict=True))
-        return [
-            Lags(
-                *(
-                    whole + sum(change * self.slopes[centre, name, sense][part] for name, change in moves.items())
-                    for part, whole in enumerate(at[sense])
-                )
-            )
-            for moves, (_, sense) in zip(changes, wanted, strict=True)
-        ]
+    def _centre(self, robot: _Columns) -> _Columns:
+        """Find the robot whose slopes hold for another; if none is near, it is this one."""
+        near = min(self.centres, key=lambda other: _distance(other, robot), default=None)
+        if near is None or _distance(near, robot) > _FAR:
+            self.centres.append(near := robot)
+        return near
 
-    def _learn(self, centre: _Columns, moved: Sequence[tuple[str, int]]) -> None:
-        """Simulate those slopes at a robot that are not known."""
-        at, wanted = dict(centre), [each for each in moved if (centre, *each) not in self.slopes]
-        steps = [_step(name, at.get(name, _null(name))) for name, _ in wanted]
-        ahead = [
-            (_at_work({**at, name: at.get(name, _null(name)) + step}), sense)
-            for (name, sense), step in zip(wanted, steps, strict=True)
-        ]
-        lags = self._simulated([*((centre, sense) for _, sense in wanted), *ahead])
-        for each, step, before, after in zip(wanted, steps, lags, lags[len(wanted) :], strict=False):
-            self.slopes[centre, *each] = Lags(*((b - a) / step for a, b in zip(before, after, strict=True)))
+    def _learn(self, wanted: Sequence[tuple[_Columns, str, int]]) -> None:
+        """Simulate those slopes that are not known, by robot, column and direction of the motor."""
+        for nonlocal_, tolerance in ((False, _TOLERANCE), (True, _COARSE)):
+            new = [key for key in wanted if key not in self.slopes and _nonlocal(key[1]) == nonlocal_]
+            values = [dict(centre).get(name, _null(name)) for centre, name, _ in new]
+            steps = [_step(name, value) for (_, name, _), value in zip(new, values, strict=True)]
+            before = [(centre, sense) for centre, _, sense in new]
+            after = [
+                (_at_work({**dict(centre), name: value + step}), sense)
+                for (centre, name, sense), value, step in zip(new, values, steps, strict=True)
+            ]
+            lags = self._simulated([*before, *after], tolerance)
+            for key, step, *ends in zip(new, steps, lags, lags[len(new) :], strict=False):
+                self.slopes[key] = Lags(*((b - a) / step for a, b in zip(*ends, strict=True)))
 
 
 def _null(name: str) -> float:
     return float(effect_named(name).null) if is_effect(name) else 0.0
 
 
-def _at_work(robot: Mapping[str, float]) -> _Columns:
-    """Sort the columns of a robot, without effects at their null."""
+def _nonlocal(name: str) -> bool:
+    return is_effect(name) and effect_named(name).reach == "nonlocal"
+
+
+def _at_work(robot: Mapping[str, float], *, local: bool = False) -> _Columns:
+    """Sort the columns of a robot, without effects at their null, or also without non-local ones."""
     return tuple(
-        sorted((name, value) for name, value in robot.items() if not is_effect(name) or value != _null(name))
+        sorted(
+            (name, value)
+            for name, value in robot.items()
+            if not is_effect(name) or (value != _null(name) and not (local and _nonlocal(name)))
+        )
     )
 
 
