@@ -45,6 +45,7 @@ def calibrate(
     paths: Sequence[str] = (),
     unit: LengthUnit | None = None,
     plan: PlanSource | None = None,
+    beside: str | Path | pd.DataFrame | None = None,
     session: str | None = None,
     specimen: str | None = None,
     trace: str | None = None,
@@ -60,8 +61,8 @@ def calibrate(
 ) -> RobotVerdict | ModelVerdict:
     """Fit measured runs, or a swim, find what the model lacks, and correct the robot, or a model of your own.
 
-    `protocol`, `laws`, `paths`, `unit`, `plan` and `options` are for a robot; `session`, `specimen`, `trace`,
-    `held_out`, `noise` and `notes` are for a model of your own.
+    `protocol`, `laws`, `paths`, `unit`, `plan`, `beside` and `options` are for a robot; `session`, `specimen`,
+    `trace`, `held_out`, `noise` and `notes` are for a model of your own.
 
     Args:
         table: measured runs, one row for each run, or their file: `N`, `l_cm`, `omega_rpm` and two or more
@@ -82,6 +83,7 @@ def calibrate(
             drawings with a size have their own.
         plan: plan.json of the path that was swum, for a track: its flips are exact, and a track without
             `direction` has no others.
+        beside: TABLE, measured runs of the robot that swam, for a track: both are fitted at once.
         session: COL, the column that says which runs were made together (default: session, if there is one).
         specimen: COL, the column that says what was run, where there are several.
         trace: COL, the column that says to which trace a reading belongs, where the model has a time. Without a
@@ -128,7 +130,7 @@ def calibrate(
     roles = Roles(session, specimen, held_out, noise, notes, trace)
     if isinstance(robot, Model):
         _refuse("a model of your own", laws=not laws, paths=paths, unit=unit, plan=plan,
-                protocol=protocol != "session", **options)  # fmt: skip
+                beside=beside is not None, protocol=protocol != "session", **options)  # fmt: skip
         with limited(limit):
             experiment, rows = read_runs_of(table, robot, roles, own=settings, title="checks" if progress else "")
             for line in (*experiment.runs.converted, *lines_of_excluded(experiment.runs)):
@@ -152,6 +154,7 @@ def calibrate(
         paths=paths,
         unit=unit,
         plan=plan,
+        beside=beside,
         limit=limit,
         jobs=jobs,
         progress=progress,

@@ -15,11 +15,15 @@ from calibration.robot.corrected_robot import check_given
 from calibration.robot.robot_verdict import RobotVerdict, read_runs
 from calibration.statistics.budget import Work
 from calibration.statistics.lab_settings import LabSettings
+from calibration.swim.joint_model import joint_model
 from calibration.swim.measured_swim import PlanSource, is_track, read_swims
 from calibration.swim.swim_model import swim_model
+from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.swimmer import SwimmerModel
+from calibration.table.reader import open_table
 from calibration.verdict.calibrate import calibrate
 from camera.pose_tracks import read_tracks
+from common.arrays import Flags
 from common.errors import InputError, naming
 from common.run_columns import convert_measured
 from common.tables import read_table
@@ -41,6 +45,7 @@ def calibrate_robot(
     paths: Sequence[str],
     unit: LengthUnit | None,
     plan: PlanSource | None,
+    beside: str | Path | pd.DataFrame | None,
     limit: Work,
     jobs: int | None,
     progress: bool,
@@ -61,13 +66,32 @@ def calibrate_robot(
         swims = read_swims(measured, plan, file=file)
         for line in (line for swim in swims for line in swim.said):
             tell(line)
+        steady = None if beside is None else _runs_beside(beside, protocol, tell)
         swum, last = swim_model(robot, swims, jobs=jobs)
-        result = calibrate(swum, held_out=last, **settings)
+        if steady is None:
+            result = calibrate(swum, held_out=last, **settings)
+        else:
+            with naming(beside):
+                joint, rows = joint_model(swum, last, SwimmerModel(robot, steady[0], jobs), steady[1])
+            result = calibrate(joint, held_out=rows, **settings)
+    elif beside is not None:
+        raise InputError(f"{name} is a table of runs; give the track of a swim, and --beside a table of runs")
     else:
         data, rows = read_runs(measured, protocol, tell, file=file)
         model = SwimmerModel(robot, data, jobs, own=own)
         result = calibrate(model, held_out=rows, describe=find_laws if laws else None, **settings)
     return replace(result, paths=path_errors(wanted, robot, result.corrected, result.knowledge))
+
+
+def _runs_beside(
+    table: str | Path | pd.DataFrame, protocol: Literal["session", "paper"], tell: Callable[[str], object]
+) -> tuple[Measurements, Flags]:
+    """Read the table of runs beside a swim, and the runs that are held out."""
+    with naming(table):
+        measured = open_table(table)
+        if is_track(measured):
+            raise InputError("--beside takes a table of steady runs, and this is a track; swims share one track")
+    return read_runs(measured, protocol, tell, file=None if isinstance(table, pd.DataFrame) else table)
 
 
 def _read(table: str | Path | pd.DataFrame, options: TrackOptions) -> pd.DataFrame:

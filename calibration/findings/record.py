@@ -388,6 +388,9 @@ def _outputs(runs: Runs) -> dict[str, Any]:
 def _data(result: Findings) -> dict[str, Any]:
     runs = result.runs
     scatter = runs.deviations(result.base.noise.run_covariance).tolist()
+    ratios = np.broadcast_to(result.final.noise.session_ratio, len(runs.outputs)).tolist()
+    ratio = dict(zip(runs.outputs, ratios, strict=True))
+    reached = [name for rows, kind in runs.pieces if runs.along[rows].any() for name in kind.outputs] or ratio
     settings = runs.settings.items()
     return {
         "outputs": list(runs.outputs),
@@ -397,10 +400,8 @@ def _data(result: Findings) -> dict[str, Any]:
         "settings": {name: [float(v.min()), float(v.max()), unit] for name, (v, unit) in settings},
         "drawn_against": [runs.drawn[0], runs.drawn[1][0]],
         "scatter_of_a_run": dict(zip(runs.outputs, scatter, strict=True)),
-        "scatter_of_sessions": math.sqrt(np.mean(result.final.noise.session_ratio)),
-        "scatter_of_sessions_by_output": dict(
-            zip(runs.outputs, np.sqrt(result.final.noise.session_ratio).tolist(), strict=True)
-        ),
+        "scatter_of_sessions": math.sqrt(np.mean([ratio[name] for name in reached])),
+        "scatter_of_sessions_by_output": {name: math.sqrt(ratio[name]) for name in reached},
         "sessions": list(runs.session_names),
         "fixed_before": result.fixed_before,
         "rows": result.rows,

@@ -143,7 +143,7 @@ class Regression:
             scale: (n,) roots of the weights of the runs.
             repeated: what tells repeats, see `Runs.repeats`; needed for the residuals' own S.
             completion: (n, k, k) of runs with gaps, see `statistical_model`; acts on what is drawn.
-            declared: S, (k, k), where it need not be estimated.
+            declared: S, (k, k), where it need not be estimated; NaN for outputs of which it must.
             along: (n,) what a shift of all runs of a session is in each run, times `scale`; default: `scale`.
         """
         n, k, m = columns.shape
@@ -175,10 +175,28 @@ class Regression:
 
     def noise(self, residual: Floats) -> Floats:
         """Estimate S (..., k, k) of residuals (..., n, k)."""
-        if self.declared is not None:
+        if self.declared is not None and not np.isnan(self.declared).any():
             return np.broadcast_to(self.declared, (*residual.shape[:-2], *self.declared.shape))
         assert self.repeated is not None
-        return repeat_covariance(residual, self.repeated, self.scale)
+        if self.declared is None:
+            return repeat_covariance(residual, self.repeated, self.scale)
+        unknown = np.isnan(self.declared)
+        rows = self._measured[:, np.diag(unknown)].any(1)
+        run_covariance = repeat_covariance(residual[..., rows, :], self.repeated[rows], self.scale[rows])
+        return np.where(unknown, run_covariance, self.declared)
+
+    @cached_property
+    def _measured(self) -> Flags:
+        """Which outputs of the runs were measured, (n, k)."""
+        if self.completion is None:
+            return np.ones(self.columns.shape[:2], dtype=bool)
+        return np.asarray(np.diagonal(self.completion, axis1=1, axis2=2) != 0)
+
+    @cached_property
+    def _scattering(self) -> Flags:
+        """Which outputs a shift of a session reaches, (k,); all where it reaches none."""
+        reached = self._measured[self.along != 0].any(0)
+        return np.asarray(reached if reached.any() else ~reached)
 
     def products(
         self, residual: Floats, run_covariance: Floats | None = None, change: Floats | None = None
@@ -209,7 +227,7 @@ class Regression:
             total[..., m, own] -= self.precision * change
             total[..., m, m] += (self.precision * change**2).sum()
         means = means.reshape(*batch, -1, m + 1)
-        return NormalEquations(total - np.swapaxes(means, -1, -2) @ means, means, self.sizes, k)
+        return NormalEquations(total - np.swapaxes(means, -1, -2) @ means, means, self.sizes, self._scattering)
 
     def draw(
         self, rng: np.random.Generator, run_covariance: Floats, session_ratio: Floats, spread: Floats | None = None
@@ -253,7 +271,16 @@ class NormalEquations:
     within: Floats  # (..., m, m)
     means: Floats  # (..., s k, m) white in S, times the roots of the sizes
     sizes: Floats  # (s,) runs of a session, or their weights
-    outputs: int
+    scattering: Flags  # (k,) outputs that a shift of a session reaches
+
+    @property
+    def outputs(self) -> int:
+        return len(self.scattering)
+
+    @property
+    def sessions(self) -> int:
+        """Number of sessions that may shift their runs; of all where none may."""
+        return int(np.count_nonzero(self.sizes > _NOTHING)) or len(self.sizes)
 
     def at(self, session_ratio: Floats | float) -> Floats:
         """Compute columnᵀ Σ⁻¹ column, (..., m, m), for ρ (..., k)."""
@@ -282,7 +309,7 @@ class NormalEquations:
         columns = self._about_common(self.means)[..., :-1]
         covariance = self._without_scatter[1]
         taken = ((columns @ covariance) * columns).sum(-1)
-        return np.asarray(len(self.sizes) - 1 - self._of_outputs(taken) > _LEAST_FREEDOM)
+        return np.asarray(self.sessions - 1 - self._of_outputs(taken) > _LEAST_FREEDOM)
 
     @cached_property
     def _without_scatter(self) -> tuple[Floats, Floats]:
@@ -292,6 +319,10 @@ class NormalEquations:
     def _of_outputs(self, means: Floats) -> Floats:
         """Add up what is stated for each session and output (..., s k), to (..., k)."""
         return np.asarray(means.reshape(*means.shape[:-1], len(self.sizes), self.outputs).sum(-2))
+
+    def _mean(self, of_axes: Floats) -> Floats:
+        """Take the mean over the axes that scatter, (..., k) to (..., 1)."""
+        return np.asarray(of_axes[..., self.scattering].mean(-1, keepdims=True))
 
     def _about_common(self, means: Floats) -> Floats:
         """Take the mean over all sessions from their means (..., s k, m), for each output."""
@@ -308,7 +339,7 @@ class NormalEquations:
         """Choose columns (c, q), (..., c, q, q)."""
         rows, cols = columns[:, :, None], columns[:, None, :]
         means = np.moveaxis(self.means[..., columns], -3, -2)
-        return NormalEquations(self.within[..., rows, cols], means, self.sizes, self.outputs)
+        return NormalEquations(self.within[..., rows, cols], means, self.sizes, self.scattering)
 
     def solve(self, *, passes: int) -> LeastSquares:
         """Fit the last of the columns with the weights W, and ρ of its residuals after `passes` iterations."""
@@ -332,7 +363,7 @@ class NormalEquations:
 
         where h of their s − 1 degrees of freedom are used by the fit.
         """
-        freedom, k, batch = len(self.sizes) - 1, self.outputs, self.within.shape[:-2]
+        freedom, k, batch = self.sessions - 1, self.outputs, self.within.shape[:-2]
         session_ratio = np.zeros((*batch, k))
         if not passes:
             return session_ratio
@@ -347,7 +378,7 @@ class NormalEquations:
                 scatter / np.maximum(k_left, 0.1) - freedom
                 for scatter, k_left in (
                     (each, 1 - taken / freedom),
-                    (each.mean(-1, keepdims=True), 1 - taken.mean(-1, keepdims=True) / freedom),
+                    (self._mean(each), 1 - self._mean(taken) / freedom),
                 )
             )
             session_ratio = np.clip(

@@ -76,7 +76,7 @@ def draw_all(result: Findings) -> dict[str, list[Drawn]]:
     else:
         figures["residuals"] = lambda: [(figure, f"residuals by output and {kind}, {model}", model)
                                         for figure, model in draw_residuals(result)]  # fmt: skip
-    if result.runs.plane is not None:
+    if any(runs.plane for _, runs in result.runs.pieces):
         figures["track"] = lambda: [
             (draw_track(result), "the track in the plane, measured and by each model", _TRACK)
         ]
@@ -143,12 +143,13 @@ def draw_summary(result: Findings) -> Figure:
 def plot_summary(axes: Axes, result: Findings) -> None:
     """Draw the bars of `draw_summary`, without a legend."""
     data = result.runs
-    noise = np.sqrt(np.diag(result.base.noise.run_covariance))
+    noise = data.scatter(result.base.noise.run_covariance)
     place = np.arange(len(data.outputs))[::-1]
     models = compared(result)
     height = 0.7 / len(models)
     for i, ((label, prediction), colour) in enumerate(zip(models, (ORANGE, GREEN), strict=False)):
-        rms = np.sqrt(((data.y - prediction)[result.split.fitted] ** 2).mean(0)) / noise
+        square = np.where(data.gaps, np.nan, (data.y - prediction) ** 2)[result.split.fitted]
+        rms = np.sqrt(np.nanmean(square, 0)) / noise
         axes.barh(
             place + height * ((len(models) - 1) / 2 - i), rms, height=0.9 * height, color=colour, label=label
         )
@@ -159,12 +160,20 @@ def plot_summary(axes: Axes, result: Findings) -> None:
 
 
 def draw_residuals(result: Findings) -> list[tuple[Figure, str]]:
-    """Draw measured minus model against a setting, a figure for each model; return each with its model."""
-    data, used = result.runs, result.split.fitted
-    residuals = {label: data.raw(data.y - prediction)[used] for label, prediction in compared(result)}
-    limits = 1.1 * np.max([np.abs(residual).max(0) for residual in residuals.values()], 0)
-    limits = np.where(limits > 0, limits, 1.0)  # also where no run departs
-    return [(_draw_residual(residual, limits, used, data), label) for label, residual in residuals.items()]
+    """Draw measured minus model against a setting, a figure for each model; return each with its model.
+
+    Rows of several kinds have a figure each.
+    """
+    figures, end = [], 0
+    for rows, data in result.runs.pieces:
+        used, outputs = result.split.fitted[rows], slice(end, end := end + len(data.outputs))
+        residuals = {
+            label: data.raw(data.y - prediction[rows, outputs])[used] for label, prediction in compared(result)
+        }
+        limits = 1.1 * np.max([np.abs(residual).max(0) for residual in residuals.values()], 0)
+        limits = np.where(limits > 0, limits, 1.0)  # also where no run departs
+        figures += [(_draw_residual(residual, limits, used, data), label) for label, residual in residuals.items()]
+    return figures
 
 
 def draw_curves(result: Findings) -> list[tuple[Figure, str]]:
@@ -183,20 +192,20 @@ def draw_curves(result: Findings) -> list[tuple[Figure, str]]:
 
 def draw_track(result: Findings) -> Figure:
     """Draw what was measured along a track in the plane, and what each model predicts of it."""
-    data = result.runs
+    piece, data = next((rows, runs) for rows, runs in result.runs.pieces if runs.plane)
     assert data.plane is not None
-    places = [data.outputs.index(name) for name in data.plane]
+    test, places = result.split.test[piece], [data.outputs.index(name) for name in data.plane]
     factor, unit = data.scale_of(data.plane[0])
     figure = Figure(figsize=(_WIDTH, _WIDTH), layout="constrained")
     axes = figure.add_subplot()
     for rows, style in (
-        (~result.split.test, {"lw": 2.5, "color": PALE}),
-        (result.split.test, {"ls": ":", "color": INK}),
+        (~test, {"lw": 2.5, "color": PALE}),
+        (test, {"ls": ":", "color": INK}),
     ):
         seen = factor * np.where(rows[:, None], data.raw(data.y)[:, places], np.nan)
         axes.plot(*seen.T, **style, label="measured" + ", held out" * bool(rows[-1]))
     for (name, prediction), colour in zip(compared(result), (ORANGE, GREEN), strict=False):
-        of_parts = data.raw(prediction)[:, places]
+        of_parts = data.raw(prediction[piece, : len(data.outputs)])[:, places]
         if data.parts is not None:  # a part begins where it was, not where the one before has led
             of_parts = np.insert(of_parts, np.flatnonzero(np.diff(data.parts[0])) + 1, np.nan, axis=0)
         axes.plot(*(factor * of_parts.T), color=colour, lw=0.9, label=name)

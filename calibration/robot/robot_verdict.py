@@ -74,7 +74,7 @@ def read_runs(
     tell: Callable[[str], object],
     *,
     file: str | Path | None = None,
-) -> tuple[Measurements, Flags | None]:
+) -> tuple[Measurements, Flags]:
     """Read the runs of a table, and those that its protocol holds out; see `softflagella.calibrate`.
 
     Args:

@@ -10,7 +10,7 @@ the bounds (Stark and Parker 1995, `scipy.optimize.lsq_linear`):
 W is Σ⁻¹ but for the mean of all sessions (`calibration.linear.gls`). D is 1 for ln C and a typical size for ε.
 λ is 0, unless the step is too long or does not improve the fit; then the step is bent along the curvature of the
 model. A parameter that the runs pull against a bound is *held* there: it is no direction of tests or of the
-covariance, which is V = A⁻¹, A = JᵀWJ, of the others, times a factor because S is estimated (`_inflation`).
+covariance, which is V = A⁻¹, A = JᵀWJ, of the others, times a factor because S is estimated (`variance_factor`).
 Nuisance parameters have priors, which are rows of their own in A, in the residual and in the deviance. Intervals
 are 95 %, by Student's t. The scatter ρ of a few sessions is uncertain, which limits the degrees of freedom
 (Satterthwaite 1946):
@@ -309,7 +309,7 @@ def fit(
     step, spread = solve_normal(normal)
     nuisances = {p.name for p in model.nuisances}
     offsets = [p.offset(point.parameters[p.name]) if p.name in nuisances else 0.0 for p in fitted]
-    inflation = _inflation(repeats, len(run_covariance))
+    inflation = variance_factor(repeats, len(run_covariance))
     return Fit(
         model=model,
         parameters=point.parameters,
@@ -569,7 +569,7 @@ def birge(runs: Runs, fitted: Fit, used: Flags) -> float:
     return max(1.0 if runs.noise_known else _EXACT, ratio)
 
 
-def _inflation(repeats: float, outputs: int) -> float:
+def variance_factor(repeats: float, outputs: int) -> float:
     """Compute the factor by which the variance is larger because S is estimated from ν repeats of k outputs.
 
     ν/(ν − k − 1), because 1/S is overestimated, times 1 + (k − 1)/(ν − k), because its weights are not optimal.
@@ -589,9 +589,7 @@ def _freedom(products: NormalEquations, session_ratio: Floats, count: int) -> Fl
     variances = [np.diag(products.covariance(s))[:count] for s in session_ratios]
     V, *near = np.maximum(variances, 1e-100)
     slopes = (np.array(near) - V) / steps[:, None]
-    error = math.sqrt(2 / max(len(products.sizes) - 1, 1)) * np.where(
-        products.estimated, session_ratio + least, 0.0
-    )
+    error = math.sqrt(2 / max(products.sessions - 1, 1)) * np.where(products.estimated, session_ratio + least, 0.0)
     variance = (((slopes + slopes.mean(0)) / 2 * error[:, None]) ** 2).sum(0)
     return np.asarray(np.clip(2 * V**2 / np.maximum(variance, 1e-12 * V**2), 1.0, 1e6))
 

@@ -101,6 +101,8 @@ class Study:
 
 def groups(data: Runs) -> tuple[Integers, tuple[str, ...]]:
     """Number the groups that stay together, (n,), and name them."""
+    if data.blocks is not None:
+        return data.blocks
     count = len(data.session_names)
     if count >= _FEWEST:
         return data.session, data.session_names
@@ -174,7 +176,7 @@ def find_outliers(data: Runs, prediction: Floats) -> tuple[Flags, tuple[Excluded
     y, checked = data.y.copy(), [data.unit_checked.get(name, False) for name in data.outputs]
     for rows in (data.session == session for session in np.unique(data.session)):
         y[rows] -= np.where(checked, np.median(residual[rows], 0), 0.0)  # such a session may differ as a whole
-    residual -= np.median(residual, 0)
+    residual -= np.nanmedian(np.where(data.gaps, np.nan, residual), 0)
     groups = [np.flatnonzero(data.condition == c) for c in np.unique(data.condition)]
     groups = [g for g in groups if len(g) > 1]
     if not groups:
@@ -278,7 +280,7 @@ def quarter_of_conditions(data: Runs, used: Flags) -> tuple[Flags, str]:
         chosen = rng.permutation(kinds)[: len(kinds) // 4]
         return data.left_out(used & np.isin(data.specimen, chosen)), "a quarter of the specimens"
     condition, inputs = data.together, data.inputs
-    what = "conditions" if data.parts is None else "stretches"
+    what = data.stretches
     if data.trace is not None:  # whole traces
         inputs, what = data.partners, "traces"
         condition = np.unique(inputs.round(9), axis=0, return_inverse=True)[1].reshape(-1)

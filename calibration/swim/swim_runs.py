@@ -66,6 +66,10 @@ class SwimRuns(Runs):
         return "pose"
 
     @property
+    def stretches(self) -> str:
+        return "stretches"
+
+    @property
     def along(self) -> Floats:
         """Zero: a shift of all poses is that of the start."""
         return np.zeros(len(self))

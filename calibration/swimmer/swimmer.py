@@ -101,6 +101,7 @@ class SwimmerModel:
     jobs: int | None = None
     solver: Solver = DIRECT
     own: LabSettings = field(default_factory=dict)  # settings that the lab has for its next runs
+    both: bool = False  # whether both directions of the motor were seen elsewhere
 
     def __post_init__(self) -> None:
         """Refuse lengths and speeds that are not possible, before anything is simulated."""
@@ -142,7 +143,7 @@ class SwimmerModel:
     @cached_property
     def _reasons(self) -> list[tuple[Influence, str]]:
         """All influences, and why these runs cannot test them; empty where they can."""
-        both = len(np.unique(np.sign(self.runs.omega))) == 2
+        both = self.both or len(np.unique(np.sign(self.runs.omega))) == 2
         return [(i, reason_untestable(i, self._drivers, both, self.runs.outputs)) for i in influences().values()]
 
     def predict(self, sets: Sequence[Parameters], *, title: str = "", lookup: NeuralTable | None = None) -> Floats:

@@ -106,13 +106,27 @@ class Runs:
         """Number and name what is held out, (n,), where it is neither sessions nor blocks of them."""
         return None
 
+    @property
+    def blocks(self) -> tuple[Integers, tuple[str, ...]] | None:
+        """Number and name what is left out in turn, (n,), where it is neither sessions nor blocks of them."""
+        return None
+
+    @property
+    def pieces(self) -> list[tuple[slice, Runs]]:
+        """Rows of one kind, and these as runs of their own outputs, in the order of rows and outputs."""
+        return [(slice(len(self)), self)]
+
     def white_features(self, table: Floats) -> Floats:
         """Whiten features (n, f), which an output may follow, along traces."""
         return self.whitened(table)
 
+    def scatter(self, run_covariance: Floats) -> Floats:
+        """Return the standard deviation (k,) of a run, from the covariance (k, k) with which fits weigh it."""
+        return np.sqrt(np.diag(run_covariance))
+
     def deviations(self, run_covariance: Floats, rows: Flags | slice = slice(None)) -> Floats:
         """Compute the standard deviation (k,) that the outputs of some rows have by noise alone, from S (k, k)."""
-        return np.sqrt(np.diag(run_covariance))
+        return self.scatter(run_covariance)
 
     def left_out(self, rows: Flags) -> Flags:
         """Return runs (n,) less those to which a group's own numbers are fitted where it is left out."""
@@ -251,6 +265,11 @@ class Runs:
         return np.column_stack([_levels(mirrored[rows]), _levels(self.session[rows]), odd])
 
     @property
+    def stretches(self) -> str:
+        """What is left out together, in a word."""
+        return "conditions"
+
+    @property
     def subject(self) -> str:
         """What the runs are of, in a word: "model", or "robot"."""
         return "model"
@@ -351,8 +370,15 @@ def _differ_more(y: Floats, condition: Integers | Floats, design: Floats) -> boo
 def features(runs: Runs, used: Flags | slice) -> tuple[tuple[str, ...], Floats]:
     """Name and compute the inputs that differ, their squares, products and cubes for all runs, (n, f).
 
-    Standardised on the runs in `used` (n,).
+    Standardised on the runs in `used` (n,). Those of one kind of rows are 0 in the others.
     """
+    if len(runs.pieces) > 1:
+        columns_of: dict[str, Floats] = {}
+        for rows, kind in runs.pieces:
+            of_kind, table = features(kind, used[rows] if isinstance(used, np.ndarray) else used)
+            for name, column in zip(of_kind, table.T, strict=True):
+                columns_of.setdefault(name, np.zeros(len(runs)))[rows] = column
+        return tuple(columns_of), np.stack(list(columns_of.values()), 1)
     given = np.column_stack([runs.inputs, *runs.states.values()])
     spread = given[used].std(0)
     varied = np.flatnonzero(spread > 1e-9).tolist()

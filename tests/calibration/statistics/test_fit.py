@@ -345,7 +345,7 @@ def test_runs_that_were_mistracked_are_excluded_and_clean_ones_are_not() -> None
         outputs = ("R_yr", "theta")
         return SimpleNamespace(
             y=y, condition=condition, session=0 * condition, row_name="row {}".format, outputs=outputs,
-            unit_checked={}, trace=None,
+            unit_checked={}, trace=None, gaps=np.zeros(y.shape, dtype=bool),
         )  # fmt: skip
 
     runs, effect = pairs(0), pairs(1)
