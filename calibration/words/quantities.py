@@ -25,6 +25,7 @@ _FEATURES = {  # what words of a feature's name read as
 _FAULTS = {"drift": "it drifts", "clock": "its clock is wrong", "step": "something was moved"}  # of traces
 _RESOLVED = 2.01  # over the number of draws and one more: the bootstrap resolves no smaller p
 _SEVERAL = "over all outputs"  # in the place of a unit, where they have several
+SHOWN = 3  # outputs in several units, where there is little room
 _NEARLY_ALL = 0.995
 _MANY_TIMES = math.log(100)
 
@@ -52,6 +53,33 @@ def error_in_words(record: Record, error: float, of: str = "") -> str:
         words = [f"{output_label(record, name)} {output_error(record, one, name)}" for name, one in each.items()]
         return " and ".join(words) or f"{plain(error)} {unit}"
     return percent(error) if unit == "%" else f"{plain(scale * error)}{_after_number(unit)}".rstrip()
+
+
+def held_out_errors(record: Record) -> tuple[list[str], dict[str, list[str]]]:
+    """Tabulate the errors on the held-out runs, of the model before and after, and by noise alone.
+
+    Returns:
+        Outputs, and model -> an error of each. Outputs that share a unit are taken together; of outputs in
+        several units those `SHOWN` are shown that gain most.
+    """
+    described = record["described"]
+    final = "with the law" if described else final_model(record["verdict"], record["nearest"], record["effects"])
+    models = {"as given": "uncalibrated", "calibrated": "before"}
+    if final:
+        models = {"calibrated": "before", final: "law" if described else "after"}
+    noise = {f"noise of a {record['row']}": "noise"} if record["noise_known"] else {}
+    names = record["outputs"]
+    if _shared_scale(record)[1] != _SEVERAL:
+        errors = {words: [error_in_words(record, record[f"error_{model}"])] for words, model in models.items()}
+        errors |= {words: [error_in_words(record, record["noise_ceiling"])] for words in noise}
+        return [output_label(record, names[0]) if len(names) == 1 else "all outputs"], errors
+    each = {**record["errors_by_output"], "noise": record["scatter_of_a_run"]}
+    first, second = (each[model] for model in models.values())
+    shown = sorted(sorted(names, key=lambda name: second[name] / (first[name] or 1.0))[:SHOWN], key=names.index)
+    return [output_label(record, name) for name in shown], {
+        words: [output_error(record, each[model][name], name) for name in shown]
+        for words, model in (models | noise).items()
+    }
 
 
 def _shared_scale(record: Record) -> tuple[float, str]:
@@ -240,6 +268,14 @@ def sized(value: float, interval: Sequence[float], of: Record, count: int = 3) -
     """Write the size of an effect with its interval."""
     low, high = (plain(end * of["shown"], count) for end in interval)
     return f"{size(value, of, count)} ({low} to {high})"
+
+
+def of_theory(value: float, interval: Sequence[float], of: Record, exactly: bool = False) -> str:
+    """Write the size of an effect with its interval, over the size that theory gives where that is 1."""
+    if exactly:
+        return f"{size(value, of)}, as theory has it"
+    words = sized(value, interval, of)
+    return words.replace(" (", " of theory (", 1) if of.get("theory") == 1 == of["shown"] else words
 
 
 def detectable(value: float, of: Record) -> str:

@@ -199,7 +199,7 @@ def test_a_report_is_in_the_words_and_units_of_a_lab_with_what_to_do_next_first(
     assert "^" not in seen.text  # no products of powers
     assert re.findall(r"omega_\w+|R_yr|theta", seen.text) == []
     assert re.search(r"one standard deviation is C_t [\d.]+ % \w+, C_r [\d.]+ % \w+ and C_yr", seen.text)
-    assert seen.headings[0] == "What to do next"
+    assert seen.headings[:2] == ["The verdict in full", "What to do next"]
     assert "Measure again: " in seen.text
     assert "scale of the camera" in seen.text
     assert [c.effect.name for c in result.attribution.candidates if f"({c.effect.name})" not in seen.text] == []

@@ -17,7 +17,16 @@ import pytest
 from calibration.findings.findings import Findings
 from calibration.report.report import sections
 from calibration.verdict.calibrate import calibrate
-from calibration.words.render import errors_in_words, next_steps, say_laws, sentence
+from calibration.words.render import (
+    badges,
+    errors_in_words,
+    headline,
+    in_brief,
+    next_in_short,
+    next_steps,
+    say_laws,
+    sentence,
+)
 from tests.calibration.words.test_words import in_report, laws_of_five_places
 from tests.oracles.falling_balls import balls, falls
 from tests.shared import shared
@@ -34,6 +43,7 @@ NAMES_RUNS = re.compile(  # where it is said what a swim cannot tell
 )
 P_VALUE = re.compile(r"\bp [=≤]")
 SPOILT = re.compile(r"\bNone\b|\bnan\b|Undefined|  |\.\.|[.,;:] [.,;]|\(\)| [.,;)]|\( ")
+TAG, OF_THE_LEAD = re.compile("<[^>]*>"), 3  # words, as "falls.csv: 45 runs"
 MODEL_TO_USE = re.compile(r"^(Plan with|Use) (the|neither) (corrected )?(robot|model)")
 
 WALL = {"title": "wall of the tube", "words": "wall of the tube (wall)", "effects": ["wall"]}
@@ -189,7 +199,15 @@ def test_every_combination_is_said_in_whole_sentences_with_one_advice(verdict: s
         seen = in_report({**record, "sentence": said, "next_steps": steps})
         first, *experiments = steps
         assert MODEL_TO_USE.match(first), first
-        for text in (said, errors, *steps):
+        brief, short = in_brief(record), next_in_short(record)
+        assert len(headline(record).split()) <= 25, headline(record)
+        assert len(brief) <= 4
+        assert 1 <= len(badges(record)) <= 5
+        assert MODEL_TO_USE.match(short[0]), short
+        assert max(len(step.split()) for step in short) <= 20, short
+        opened = sections({**record, "sentence": said, "next_steps": steps}, {}).partition("<h2>")[0]
+        assert len(f"{headline(record)} {TAG.sub(' ', opened)}".split()) <= 90 - OF_THE_LEAD, opened
+        for text in (said, errors, *steps, *brief, *short):
             assert not SPOILT.search(text), text
         assert all(text and text.endswith(".") for text in (said, *steps)), steps
         for step in experiments:
