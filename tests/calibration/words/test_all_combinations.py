@@ -68,8 +68,12 @@ FORMS = [
 UNFITTED = {"title": "drag", "reason": "its fit did not converge"}
 FORBIDDEN = {"title": "decoy", "error_before": 0.12, "error_after": 0.17}
 CONDITIONS = {"names": "balls 2 and 5", "before": 0.12, "after": 0.04, "p_value": 0.2}
+POSE = {"x": 0.012, "y": 0.034, "heading": 0.056}
 SWIM = {"row": "pose", "locked_test": "last third of swim", "sessions": ["swim"], "next_runs": [],
-        "limits": [], "drawn_against": ["time", "direction of the motor"]}  # fmt: skip
+        "limits": [], "drawn_against": ["time", "direction of the motor"], "outputs": list(POSE),
+        "output_titles": {}, "output_scales": {"x": [100.0, "cm"], "y": [100.0, "cm"], "heading": [57.3, "°"]},
+        "errors_by_output": dict.fromkeys(("uncalibrated", "before", "after", "law"), POSE),
+        "scatter_of_a_run": POSE}  # fmt: skip
 BATCH = {"runs": 4 * [{"depth": 4.0}], "decides": 0.9, "worth_making": True}
 GAINS: dict[str, Record] = {
     "certain": {"error_after": 0.04, "gain_interval": [0.05, 0.11], "gain_is_certain": True},
@@ -253,7 +257,7 @@ def test_what_the_loop_found_has_its_sections() -> None:
     )
     assert "These runs have been looked at 2 times." in said
     assert "falls from 12.00 % to 4.00 % (by 8.00 %, 95 % interval 5.00 to 11.00 %)" in said
-    forms = "tell these forms apart: wall of the tube at the size of theory, 1 (3.20 %); inertia (3.30 %)."
+    forms = "tell these alternatives apart: wall of the tube at the size of theory, 1 (3.20 %); inertia (3.30 %)."
     assert forms in said
     assert "The loop" in seen
     assert "1 – 12.00 % speed along depth" in seen
@@ -268,7 +272,7 @@ def test_what_the_loop_found_has_its_sections() -> None:
         ({"time": [1.0, "s"]}, " s"),
         ({"time": [1.0, "s"], "lag": [1.0, "s"]}, " s"),
         ({"angle": [1.0, "°"]}, "°"),
-        ({"time": [1.0, "s"], "speed": [100.0, "%"]}, " over all outputs"),
+        ({"count": [1.0, ""]}, ""),
     ],
 )
 def test_errors_of_differences_are_in_the_unit_that_they_share(scales: Record, unit: str) -> None:
@@ -281,9 +285,7 @@ def test_errors_of_differences_are_in_the_unit_that_they_share(scales: Record, u
     said, errors, seen = sentence(record), errors_in_words(record), in_report(record)
     assert f"falls from 0.12{unit} to 0.04{unit} (by 0.08{unit}, 95 % interval 0.05 to 0.11{unit})" in said
     assert not re.search(r"\b(12|4)\.00 %", seen)
-    if "all" in unit:
-        return
-    assert f"as given 0.2{unit}, calibrated 0.12{unit}, with the adopted form 0.04{unit}" in errors
+    assert f"as given 0.2{unit}, calibrated 0.12{unit}, with the nearest effect 0.04{unit}" in errors
     for text in (said, errors, *next_steps({**record, "advice": "as given"})):
         assert not re.search(r"\b\d+\.\d+ %", text), text
 
@@ -301,6 +303,10 @@ def test_errors_of_ratios_and_differences_are_each_in_its_unit(unit: str) -> Non
         "output_scales": {"speed": [100.0, "%"], "angle": [1.0, unit]},
         "errors_by_output": by_output, "scatter_of_a_run": {"speed": 0.02, "angle": 0.1},
     }  # fmt: skip
+    claimed = with_flags("partial", {**changes, "nearest": NEAREST, **GAINS["certain"]})
+    falls_to = f"falls from speed 5.0 % and angle 0.3 {unit}".rstrip()
+    assert falls_to in sentence(claimed)
+    assert "(95 % interval without zero)" in sentence(claimed)
     errors = errors_in_words(with_flags("none", changes))
     assert f"calibrated speed 5.0 % and angle 0.3 {unit}".rstrip() in errors
     assert f"noise of a run speed 2.0 % and angle 0.1 {unit}".rstrip() in errors
