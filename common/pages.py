@@ -57,8 +57,9 @@ _NUMBER, _TOGETHER = re.compile(r"(?<=\d) (?=[^\W\d]|[%°±])"), "\u00a0"
 class Page:
     """A page built from top to bottom; all text is escaped."""
 
-    def __init__(self, title: str, lead: str):
-        self._title, self._lead = title, lead
+    def __init__(self, title: str, lead: str, *, folded: bool = False):
+        """Begin a page; `folded`: a reader opens the sections that have a heading."""
+        self._title, self._lead, self._folded = title, lead, folded
         self._sections: list[tuple[str, list[Markup]]] = [("", [])]  # heading, parts; the first has no heading
         self._figures = 0
 
@@ -89,10 +90,12 @@ class Page:
 
     def add(self, sections: str) -> None:
         """Add sections of HTML, each from its heading `<h2>` on; their plain tables become tables of the page."""
-        for section in sections.split("<h2>")[1:]:
+        opening, *others = re.sub(r"<table>(.*?)</table>", _finished, sections, flags=re.DOTALL).split("<h2>")
+        self._add("{}", Markup(opening))
+        for section in others:
             heading, _, content = section.partition("</h2>")
             self.section(html.unescape(heading))
-            self._add("{}", Markup(re.sub(r"<table>(.*?)</table>", _finished, content, flags=re.DOTALL)))
+            self._add("{}", Markup(content))
 
     def figure(self, figure: Figure, description: str) -> None:
         """Add a figure, with a description for people who cannot see it."""
@@ -114,7 +117,8 @@ class Page:
     def write(self, path: str | Path, footer: str) -> None:
         """Write the page completely or not at all."""
         template = Template(_TEMPLATE.read_text(encoding="utf-8"), autoescape=True)
-        content = {"title": self._title, "lead": inline(self._lead), "sections": self._sections, "footer": footer}
+        content = {"title": self._title, "lead": inline(self._lead), "sections": self._sections, "footer": footer,
+                   "folded": self._folded}  # fmt: skip
         write_text(path, template.render(content, light=variables(1), dark=variables(2)))
 
 

@@ -38,6 +38,7 @@ WORDS = {  # the most important commands -> package and command
     for word in words.split()
 }
 _WORD_OF = {place: word for word, place in WORDS.items()}
+_MOST_LINES = 8  # about a verdict
 program = Program("softflagella", "soft flagellated robots near a surface")
 
 
@@ -105,14 +106,13 @@ def _calibrate(
     with stopped_by_interrupt():
         result = calibrate(table=measured, robot=given, paths=stated, tell=to_stderr)
     files = result.save(out)
-    print(result.sentence)
-    print(result.errors_in_words)
-    for error in result.paths:
-        print(error.sentence)
-    for limit in result.caveats:
-        print(f"the conclusion is weaker: {limit}")
-    for line in summary_of_excluded(result.split.outliers, result.rows):
-        print(f"excluded: {line}")
+    beside = [error.sentence for error in result.paths]
+    beside += [f"the conclusion is weaker: {limit}" for limit in result.caveats]
+    beside += [f"excluded: {line}" for line in summary_of_excluded(result.split.outliers, result.rows)]
+    room = _MOST_LINES - 1 - len(result.in_brief)
+    if len(beside) > room:
+        beside[room - 1 :] = [f"{len(beside) - room + 1} more lines are in the report"]
+    print(*result.in_brief, *beside, sep="\n")
     print(f"-> {', '.join(map(str, files))}")
 
 

@@ -23,7 +23,7 @@ from calibration.table.between_repeats import Difference
 from calibration.table.excluded import count_of_rows
 from calibration.table.runs import Runs
 from calibration.words.quantities import difference_in_words, move_in_words
-from calibration.words.render import next_steps, sentence
+from calibration.words.render import badges, headline, next_steps, sentence
 from common.provenance import provenance
 
 MODELS = ("uncalibrated", "before", "after", "law", "new_specimen")  # with stated errors
@@ -36,6 +36,8 @@ def verdict_record(record: Mapping[str, Any], *, table: str) -> dict[str, Any]:
     """Write the facts of a verdict as verdict.json has them, with its texts; `path` has errors on paths."""
     return {
         **{key: record[key] for key in ("verdict", "effects")},
+        "headline": headline(record),
+        "badges": badges(record),
         "sentence": sentence(record),
         "next_steps": next_steps(record),
         **record,
@@ -102,6 +104,7 @@ def shown(parameter: Parameter) -> dict[str, Any]:
         "unit": parameter.unit,
         "shown": parameter.shown,
         "given": parameter.start,
+        "theory": parameter.theory,
         "scale": "logarithm" if parameter.logarithmic else "as it is",
     }
 

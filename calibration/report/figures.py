@@ -70,6 +70,8 @@ def draw_all(result: Findings) -> dict[str, list[Drawn]]:
         "summary": lambda: [(draw_summary(result), "residual of each output over the noise, for each model",
                              f"The same on the {row}s that were fitted, for each output.")],
     }  # fmt: skip
+    if result.runs.plane is None:
+        figures["held_out"] = lambda: [(draw_held_out(result), "held-out runs, before and after", "")]
     if result.runs.trace is not None:
         figures["curves"] = lambda: [(figure, f"{output} of held-out traces against time, and residuals", _CURVES)
                                      for figure, output in draw_curves(result)]  # fmt: skip
@@ -159,6 +161,70 @@ def plot_summary(axes: Axes, result: Findings) -> None:
     axes.tick_params(axis="x", labelsize=8)
 
 
+def draw_held_out(result: Findings) -> Figure:
+    """Draw measured minus model for the output that gains most, in the held-out runs; of traces in the median one.
+
+    Runs are drawn against the setting that tells most of what the calibrated model leaves, traces against time.
+    """
+    data, rows, k = result.runs, result.split.test, _gaining(result)[0]
+    (factor, unit), title, styles = data.scale_of(data.outputs[k]), data.title_of(data.outputs[k]), ("s", "o")
+    measured = np.where(data.gaps[:, k], np.nan, data.raw(data.y)[:, k])
+    residuals = [(name, measured - data.raw(prediction)[:, k]) for name, prediction in compared(result)]
+    if data.trace is not None:
+        traces = _ranked(result, residuals[-1][1])
+        rows, words = traces[len(traces) // 2]
+        along, label, styles, title = np.asarray(data.time), _time_label(data), ("-", "-"), f"{title}, {words}"
+    else:
+        settings = data.settings
+        name = max(settings, key=lambda name: _told(settings[name][0], residuals[0][1], result.split.fitted))
+        along, label = settings[name][0], _labelled(name, settings[name][1].strip())
+    figure = Figure(figsize=(_WIDTH, 3.2), layout="constrained")
+    axes = figure.add_subplot()
+    if band := _band(result, k):
+        axes.axhspan(-factor * band, factor * band, color=PALE, alpha=0.5, lw=0, label="± 2 σ of the noise")
+    axes.axhline(0, color=INK, lw=0.6)
+    for (model, residual), colour, style in zip(residuals, (ORANGE, GREEN), styles, strict=False):
+        axes.plot(along[rows], factor * residual[rows], style, ms=5, color=colour, label=model)
+    axes.set_xlabel(label, fontsize=9)
+    axes.set_ylabel(f"measured − model{f' [{unit}]' if unit else ''}", fontsize=9)
+    axes.set_title(fill(title, 2 * _LINE), fontsize=9, loc="left", parse_math=False)
+    axes.tick_params(labelsize=8)
+    figure.legend(loc="outside upper center", fontsize=8, frameon=False, ncols=2)
+    return figure
+
+
+def _told(setting: Floats, residual: Floats, used: Flags) -> float:
+    """Return which share of a residual (n,) in the runs `used` a parabola in a setting removes."""
+    rows = used & np.isfinite(residual)
+    if len(np.unique(setting[rows])) < 3 or not residual[rows].any():
+        return 0.0
+    x = (setting - setting[rows].mean()) / np.ptp(setting[rows])
+    left = residual[rows] - np.polyval(np.polyfit(x[rows], residual[rows], 2), x[rows])
+    return 1 - float(left.var() / residual[rows].var())
+
+
+def _labelled(words: str, unit: str) -> str:
+    """Label an axis."""
+    return f"{words} [{unit}]" if unit else words
+
+
+def _time_label(data: Runs) -> str:
+    quantity, unit = split(data.time_name)
+    return _labelled(quantity, unit.text if unit else "")
+
+
+def _band(result: Findings, k: int) -> float:
+    """Return two standard deviations of the noise of an output; 0 where it is unknown."""
+    return 2 * float(np.sqrt(result.final.noise.run_covariance[k, k])) if result.runs.noise_known else 0.0
+
+
+def _gaining(result: Findings) -> list[int]:
+    """List the outputs, that whose error on the held-out runs falls most first."""
+    errors = result.errors.by_output
+    gains = [errors["after"][name] / max(errors["before"][name], _LEAST) for name in result.runs.outputs]
+    return [int(k) for k in np.argsort(gains, kind="stable")]
+
+
 def draw_residuals(result: Findings) -> list[tuple[Figure, str]]:
     """Draw measured minus model against a setting, a figure for each model; return each with its model.
 
@@ -184,9 +250,7 @@ def draw_curves(result: Findings) -> list[tuple[Figure, str]]:
     Returns:
         A figure for each output, at most _OUTPUTS of them, those with the largest gain; each with its output.
     """
-    data, errors = result.runs, result.errors.by_output
-    gains = [errors["after"][name] / max(errors["before"][name], _LEAST) for name in data.outputs]
-    shown = sorted(np.argsort(gains, kind="stable")[:_OUTPUTS].tolist())
+    data, shown = result.runs, sorted(_gaining(result)[:_OUTPUTS])
     return [(_draw_curves(result, k), data.title_of(data.outputs[k])) for k in shown]
 
 
@@ -229,7 +293,7 @@ def _draw_curves(result: Findings, k: int) -> Figure:
     figure = Figure(figsize=(_WIDTH, sum(heights) + 1.4), layout="constrained")
     panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights, squeeze=False)[:, 0]
     curves, residuals = panels[: len(held_out)], panels[len(held_out) :]
-    band = 2 * float(np.sqrt(result.final.noise.run_covariance[k, k])) if data.noise_known else 0.0
+    band = _band(result, k)
     for axes, (rows, words) in zip(curves, held_out, strict=True):
         _draw_trace(axes, data, rows, [("measured", measured), *models], k, band)
         axes.set_title(words, fontsize=8, loc="left", pad=3, parse_math=False)
@@ -244,10 +308,8 @@ def _draw_curves(result: Findings, k: int) -> Figure:
     for axes in panels:
         axes.tick_params(labelsize=8)
         axes.yaxis.set_major_locator(MaxNLocator(4))
-    quantity, unit_of_time = split(data.time_name)
-    panels[-1].set_xlabel(f"{quantity} [{unit_of_time.text}]" if unit_of_time else quantity, fontsize=9)
-    title = data.title_of(data.outputs[k])
-    figure.supylabel(title if unit in ("", "%") else f"{title} [{unit}]", fontsize=9)
+    panels[-1].set_xlabel(_time_label(data), fontsize=9)
+    figure.supylabel(_labelled(data.title_of(data.outputs[k]), "" if unit == "%" else unit), fontsize=9)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", fontsize=8, frameon=False, ncols=2)
     return figure
@@ -303,12 +365,12 @@ def _draw_residual(residual: Floats, limits: Floats, used: Flags, data: Runs) ->
             axes.plot(values[some] + jitter[some], scale * residual[some, i], ".", ms=4, color=colour)
         axes.axhline(0, color=INK, lw=0.6)
         axes.set_ylim(-scale * limits[i], scale * limits[i])
-        axes.set_ylabel(f"{data.title_of(name)} [{unit}]".removesuffix(" []"), fontsize=8)
+        axes.set_ylabel(_labelled(data.title_of(name), unit), fontsize=8)
         axes.tick_params(labelsize=8)
     levels = np.unique(values)
     if len(levels) <= 8:
         panels[-1].set_xticks(levels, [f"{value:g}" for value in levels])
-    panels[-1].set_xlabel(f"{setting} [{unit_of_setting.strip()}]" if unit_of_setting else setting, fontsize=9)
+    panels[-1].set_xlabel(_labelled(setting, unit_of_setting.strip()), fontsize=9)
     _name_kinds(panels[0], kinds)
     figure.align_ylabels()
     figure.tight_layout(h_pad=0.3)

@@ -14,16 +14,16 @@ from calibration.findings.findings import Findings
 from calibration.findings.next_runs import STOP
 from calibration.report.figures import Drawn, draw_all
 from calibration.statistics.fit import WRONG
-from calibration.words.render import rendered
+from calibration.words.render import badges, headline, next_in_short, rendered
 from common.pages import Page, figures_markup, inline
 from common.provenance import code_version
 
 
 def write_report(result: Findings, record: Mapping[str, Any], out: str | Path) -> None:
     """Write report.html from a verdict and its record."""
-    page = Page(f"Calibration: {record['table']}", record["sentence"])
+    page = Page(headline(record), f"{record['table']}: {record['number_of_runs']} {record['row']}s", folded=True)
     page.add(sections(record, draw_all(result)))
-    page.write(out, f"code {code_version()}; fixed before the data was looked at: {record['fixed_before']}")
+    page.write(out, f"code {code_version()}")
 
 
 def sections(record: Mapping[str, Any], figures: Mapping[str, Sequence[Drawn]]) -> str:
@@ -33,8 +33,9 @@ def sections(record: Mapping[str, Any], figures: Mapping[str, Sequence[Drawn]]) 
         first = 1 + sum(len(figures[before]) for before in markup)
         markup[name] = Markup(figures_markup(drawn, first))
     constants = {"stop": STOP, "beyond": f"{WRONG:g}", "imitable_above": IMITABLE, "sure": SURE}
+    texts = {"badges": badges(record), "next_in_short": next_in_short(record)}
     functions: dict[str, Any] = {"inline": lambda words: Markup(inline(words)), "counted": _counted}
-    return rendered("report.j2", {**record, **constants, **functions, "figures": markup})
+    return rendered("report.j2", {**record, **constants, **texts, **functions, "figures": markup})
 
 
 def _counted(runs: Iterable[Mapping[str, Any]]) -> list[tuple[tuple[Any, ...], int]]:

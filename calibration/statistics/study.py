@@ -113,7 +113,7 @@ def groups(data: Runs) -> tuple[Integers, tuple[str, ...]]:
         members = data.session == session
         condition = np.unique(data.together[members], return_inverse=True)[1].reshape(-1)
         block[members] = session * parts + rng.permutation(condition.max() + 1)[condition] % parts
-    names = (f"{name}, block {i + 1} of its conditions" for name in data.session_names for i in range(parts))
+    names = (f"{name}, part {i + 1} of {parts}" for name in data.session_names for i in range(parts))
     return block, tuple(names)
 
 

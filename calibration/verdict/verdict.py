@@ -14,7 +14,7 @@ from calibration.findings.findings import Findings
 from calibration.findings.record import corrected_record, facts, verdict_record
 from calibration.findings.samples import draw_samples, open_forms
 from calibration.words.quantities import sized
-from calibration.words.render import errors_in_words, sentence
+from calibration.words.render import errors_in_words, headline, in_brief, sentence
 from common.files import files_together, write_text
 from common.notebook import Shown, given_axes
 from common.provenance import provenance
@@ -47,6 +47,16 @@ class Verdict(Shown, Findings):
     def facts(self) -> dict[str, Any]:
         """What every text is made of; the larger part of verdict.json."""
         return facts(self)
+
+    @property
+    def headline(self) -> str:
+        """The verdict in one sentence of few words, with the size of what it names."""
+        return headline(self.facts)
+
+    @property
+    def in_brief(self) -> list[str]:
+        """Lines: headline, what kind of verdict it is, and the errors on the held-out runs."""
+        return in_brief(self.facts)
 
     @property
     def sentence(self) -> str:

@@ -24,7 +24,8 @@ _FEATURES = {  # what words of a feature's name read as
 }  # fmt: skip
 _FAULTS = {"drift": "it drifts", "clock": "its clock is wrong", "step": "something was moved"}  # of traces
 _RESOLVED = 2.01  # over the number of draws and one more: the bootstrap resolves no smaller p
-_SEVERAL = "over all outputs"  # in the place of a unit, where they have several
+_SEVERAL = "several units"  # in the place of a unit, where outputs have several
+SHOWN = 3  # outputs in several units, where there is little room
 _NEARLY_ALL = 0.995
 _MANY_TIMES = math.log(100)
 
@@ -50,8 +51,36 @@ def error_in_words(record: Record, error: float, of: str = "") -> str:
     if unit == _SEVERAL:
         each = {**record["errors_by_output"], "noise": record["scatter_of_a_run"]}.get(of) or {}
         words = [f"{output_label(record, name)} {output_error(record, one, name)}" for name, one in each.items()]
-        return " and ".join(words) or f"{plain(error)} {unit}"
+        names = ", ".join(output_label(record, name) for name in record["outputs"])
+        return " and ".join(words) or f"{plain(error)} over {names}, in the units of the fit"
     return percent(error) if unit == "%" else f"{plain(scale * error)}{_after_number(unit)}".rstrip()
+
+
+def held_out_errors(record: Record) -> tuple[list[str], dict[str, list[str]]]:
+    """Tabulate the errors on the held-out runs, of the model before and after, and by noise alone.
+
+    Returns:
+        Outputs, and model -> an error of each. Outputs that share a unit are taken together; of outputs in
+        several units those `SHOWN` are shown that gain most.
+    """
+    described = record["described"]
+    final = "with the law" if described else final_model(record["verdict"], record["nearest"], record["effects"])
+    models = {"as given": "uncalibrated", "calibrated": "before"}
+    if final:
+        models = {"calibrated": "before", final: "law" if described else "after"}
+    noise = {f"noise of a {record['row']}": "noise"} if record["noise_known"] else {}
+    names = record["outputs"]
+    if _shared_scale(record)[1] != _SEVERAL:
+        errors = {words: [error_in_words(record, record[f"error_{model}"])] for words, model in models.items()}
+        errors |= {words: [error_in_words(record, record["noise_ceiling"])] for words in noise}
+        return [output_label(record, names[0]) if len(names) == 1 else "all outputs"], errors
+    each = {**record["errors_by_output"], "noise": record["scatter_of_a_run"]}
+    first, second = (each[model] for model in models.values())
+    shown = sorted(sorted(names, key=lambda name: second[name] / (first[name] or 1.0))[:SHOWN], key=names.index)
+    return [output_label(record, name) for name in shown], {
+        words: [output_error(record, each[model][name], name) for name in shown]
+        for words, model in (models | noise).items()
+    }
 
 
 def _shared_scale(record: Record) -> tuple[float, str]:
@@ -156,13 +185,15 @@ def percent(value: float, decimals: int = 2) -> str:
 def interval_in_words(record: Record, interval: Sequence[float]) -> str:
     """Write the 95 % interval of an error over all outputs, or of a gain, as `error_in_words` does."""
     scale, unit = _shared_scale(record)
+    if unit == _SEVERAL:
+        return f"95 % interval {'with' if interval[0] <= 0 else 'without'} zero"
     low, high = (f"{scale * end:.2f}" if unit == "%" else plain(scale * end) for end in interval)
     return f"95 % interval {low} to {high}{_after_number(unit)}".rstrip()
 
 
 def gain_in_words(record: Record, before: float, after: float, interval: Sequence[float] | None) -> str:
     """Say whether the error on the held-out runs falls with what is claimed; an interval with zero is no gain."""
-    without, with_it = error_in_words(record, before), error_in_words(record, after)
+    without, with_it = error_in_words(record, before, "before"), error_in_words(record, after, "after")
     rows = f"{record['row']}s"
     if after >= before:
         return f"the error on the held-out {rows} does not fall with it ({without} without, {with_it} with it)"
@@ -175,7 +206,8 @@ def gain_in_words(record: Record, before: float, after: float, interval: Sequenc
             f"there is no gain that these {rows} can show "
             f"(error on the held-out ones {without} without, {with_it} with it; gain, {words})"
         )
-    return f"{falls} (by {error_in_words(record, before - after)}, {words})"
+    by = "" if _shared_scale(record)[1] == _SEVERAL else f"by {error_in_words(record, before - after)}, "
+    return f"{falls} ({by}{words})"
 
 
 def removed(share: float) -> str:
@@ -242,6 +274,14 @@ def sized(value: float, interval: Sequence[float], of: Record, count: int = 3) -
     return f"{size(value, of, count)} ({low} to {high})"
 
 
+def of_theory(value: float, interval: Sequence[float], of: Record, exactly: bool = False) -> str:
+    """Write the size of an effect with its interval, over the size that theory gives where that is 1."""
+    if exactly:
+        return f"{size(value, of)}, as theory has it"
+    words = sized(value, interval, of)
+    return words.replace(" (", " of theory (", 1) if of.get("theory") == 1 == of["shown"] else words
+
+
 def detectable(value: float, of: Record) -> str:
     """Write a smallest detectable size; a dash where no size shows in these runs."""
     if value >= UNSEEN:
@@ -278,5 +318,5 @@ def final_model(verdict: str, nearest: object, effects: Sequence[str]) -> str:
     if verdict == "number":
         return "with the fitted value"
     if nearest:
-        return "with the adopted form"
+        return "with the nearest effect"
     return "with the verdict's effects" if effects else ""

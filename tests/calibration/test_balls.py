@@ -115,7 +115,7 @@ def test_its_error_before_and_after_stands_in_sentence_record_and_report(tmp_pat
     assert record["nearest"]["effect"] == "linear_drag"
     assert len(record["nearest"]["sizes"]) == 10
     assert record["error_after"] < record["error_new_specimen"] < record["error_before"]
-    assert "The nearest form" in page
+    assert "The nearest effect" in page
     assert before in page
     assert after in page
     assert not any("corrected.toml" in step for step in record["next_steps"])

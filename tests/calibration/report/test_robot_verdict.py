@@ -188,7 +188,7 @@ def page(result: Verdict, folder: Path) -> PageText:
 
 
 @pytest.mark.slow
-def test_a_report_is_in_the_words_and_units_of_a_lab_with_what_to_do_next_first(tmp_path: Path) -> None:
+def test_a_report_is_in_the_words_and_units_of_a_lab_with_what_to_do_next_near_the_top(tmp_path: Path) -> None:
     """verdict.json stays in SI units; only what is shown has others."""
     result = number()
     seen = page(result, tmp_path)
@@ -199,11 +199,11 @@ def test_a_report_is_in_the_words_and_units_of_a_lab_with_what_to_do_next_first(
     assert "^" not in seen.text  # no products of powers
     assert re.findall(r"omega_\w+|R_yr|theta", seen.text) == []
     assert re.search(r"one standard deviation is C_t [\d.]+ % \w+, C_r [\d.]+ % \w+ and C_yr", seen.text)
-    assert seen.headings[0] == "What to do next"
+    assert seen.headings[:2] == ["The verdict in full", "What to do next"]
     assert "Measure again: " in seen.text
     assert "scale of the camera" in seen.text
     assert [c.effect.name for c in result.attribution.candidates if f"({c.effect.name})" not in seen.text] == []
-    assert seen.text.count("tail length [cm]") == 2  # of the calibrated and of the final model
+    assert seen.text.count("tail length [cm]") == 3  # of both models, and on the first screen
     record = result.to_dict()
     given = {entry["name"]: entry["given"] for entry in record["numbers_as_given"]}
     assert given["youngs_modulus"] == START.youngs_modulus

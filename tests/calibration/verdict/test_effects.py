@@ -86,7 +86,7 @@ def test_what_comes_nearest_is_adopted_where_nothing_explains() -> None:
     table["omega_h_rpm"] *= np.exp(0.04 * np.sin(3.0 * table["l_cm"]) * np.sign(table["omega_rpm"]))
     result = calibrated(table, few=True)
     assert (result.verdict, result.effects) == ("partial", ())
-    assert "The nearest form, head's end-over-end drag (end_over_end_drag), is adopted" in result.sentence
+    assert "The nearest effect, head's end-over-end drag (end_over_end_drag), is kept" in result.sentence
     assert result.error_after < 0.75 * result.error_before
     robot = verdict_of(result)
     assert 2.0 < robot.corrected.effects[DRAG] < 8.0

@@ -17,7 +17,16 @@ import pytest
 from calibration.findings.findings import Findings
 from calibration.report.report import sections
 from calibration.verdict.calibrate import calibrate
-from calibration.words.render import errors_in_words, next_steps, say_laws, sentence
+from calibration.words.render import (
+    badges,
+    errors_in_words,
+    headline,
+    in_brief,
+    next_in_short,
+    next_steps,
+    say_laws,
+    sentence,
+)
 from tests.calibration.words.test_words import in_report, laws_of_five_places
 from tests.oracles.falling_balls import balls, falls
 from tests.shared import shared
@@ -34,6 +43,7 @@ NAMES_RUNS = re.compile(  # where it is said what a swim cannot tell
 )
 P_VALUE = re.compile(r"\bp [=≤]")
 SPOILT = re.compile(r"\bNone\b|\bnan\b|Undefined|  |\.\.|[.,;:] [.,;]|\(\)| [.,;)]|\( ")
+TAG, OF_THE_LEAD = re.compile("<[^>]*>"), 3  # words, as "falls.csv: 45 runs"
 MODEL_TO_USE = re.compile(r"^(Plan with|Use) (the|neither) (corrected )?(robot|model)")
 
 WALL = {"title": "wall of the tube", "words": "wall of the tube (wall)", "effects": ["wall"]}
@@ -58,8 +68,12 @@ FORMS = [
 UNFITTED = {"title": "drag", "reason": "its fit did not converge"}
 FORBIDDEN = {"title": "decoy", "error_before": 0.12, "error_after": 0.17}
 CONDITIONS = {"names": "balls 2 and 5", "before": 0.12, "after": 0.04, "p_value": 0.2}
+POSE = {"x": 0.012, "y": 0.034, "heading": 0.056}
 SWIM = {"row": "pose", "locked_test": "last third of swim", "sessions": ["swim"], "next_runs": [],
-        "limits": [], "drawn_against": ["time", "direction of the motor"]}  # fmt: skip
+        "limits": [], "drawn_against": ["time", "direction of the motor"], "outputs": list(POSE),
+        "output_titles": {}, "output_scales": {"x": [100.0, "cm"], "y": [100.0, "cm"], "heading": [57.3, "°"]},
+        "errors_by_output": dict.fromkeys(("uncalibrated", "before", "after", "law"), POSE),
+        "scatter_of_a_run": POSE}  # fmt: skip
 BATCH = {"runs": 4 * [{"depth": 4.0}], "decides": 0.9, "worth_making": True}
 GAINS: dict[str, Record] = {
     "certain": {"error_after": 0.04, "gain_interval": [0.05, 0.11], "gain_is_certain": True},
@@ -189,7 +203,15 @@ def test_every_combination_is_said_in_whole_sentences_with_one_advice(verdict: s
         seen = in_report({**record, "sentence": said, "next_steps": steps})
         first, *experiments = steps
         assert MODEL_TO_USE.match(first), first
-        for text in (said, errors, *steps):
+        brief, short = in_brief(record), next_in_short(record)
+        assert len(headline(record).split()) <= 25, headline(record)
+        assert len(brief) <= 4
+        assert 1 <= len(badges(record)) <= 5
+        assert MODEL_TO_USE.match(short[0]), short
+        assert max(len(step.split()) for step in short) <= 20, short
+        opened = sections({**record, "sentence": said, "next_steps": steps}, {}).partition("<h2>")[0]
+        assert len(f"{headline(record)} {TAG.sub(' ', opened)}".split()) <= 90 - OF_THE_LEAD, opened
+        for text in (said, errors, *steps, *brief, *short):
             assert not SPOILT.search(text), text
         assert all(text and text.endswith(".") for text in (said, *steps)), steps
         for step in experiments:
@@ -235,7 +257,7 @@ def test_what_the_loop_found_has_its_sections() -> None:
     )
     assert "These runs have been looked at 2 times." in said
     assert "falls from 12.00 % to 4.00 % (by 8.00 %, 95 % interval 5.00 to 11.00 %)" in said
-    forms = "tell these forms apart: wall of the tube at the size of theory, 1 (3.20 %); inertia (3.30 %)."
+    forms = "tell these alternatives apart: wall of the tube at the size of theory, 1 (3.20 %); inertia (3.30 %)."
     assert forms in said
     assert "The loop" in seen
     assert "1 – 12.00 % speed along depth" in seen
@@ -250,7 +272,7 @@ def test_what_the_loop_found_has_its_sections() -> None:
         ({"time": [1.0, "s"]}, " s"),
         ({"time": [1.0, "s"], "lag": [1.0, "s"]}, " s"),
         ({"angle": [1.0, "°"]}, "°"),
-        ({"time": [1.0, "s"], "speed": [100.0, "%"]}, " over all outputs"),
+        ({"count": [1.0, ""]}, ""),
     ],
 )
 def test_errors_of_differences_are_in_the_unit_that_they_share(scales: Record, unit: str) -> None:
@@ -263,9 +285,7 @@ def test_errors_of_differences_are_in_the_unit_that_they_share(scales: Record, u
     said, errors, seen = sentence(record), errors_in_words(record), in_report(record)
     assert f"falls from 0.12{unit} to 0.04{unit} (by 0.08{unit}, 95 % interval 0.05 to 0.11{unit})" in said
     assert not re.search(r"\b(12|4)\.00 %", seen)
-    if "all" in unit:
-        return
-    assert f"as given 0.2{unit}, calibrated 0.12{unit}, with the adopted form 0.04{unit}" in errors
+    assert f"as given 0.2{unit}, calibrated 0.12{unit}, with the nearest effect 0.04{unit}" in errors
     for text in (said, errors, *next_steps({**record, "advice": "as given"})):
         assert not re.search(r"\b\d+\.\d+ %", text), text
 
@@ -283,6 +303,10 @@ def test_errors_of_ratios_and_differences_are_each_in_its_unit(unit: str) -> Non
         "output_scales": {"speed": [100.0, "%"], "angle": [1.0, unit]},
         "errors_by_output": by_output, "scatter_of_a_run": {"speed": 0.02, "angle": 0.1},
     }  # fmt: skip
+    claimed = with_flags("partial", {**changes, "nearest": NEAREST, **GAINS["certain"]})
+    falls_to = f"falls from speed 5.0 % and angle 0.3 {unit}".rstrip()
+    assert falls_to in sentence(claimed)
+    assert "(95 % interval without zero)" in sentence(claimed)
     errors = errors_in_words(with_flags("none", changes))
     assert f"calibrated speed 5.0 % and angle 0.3 {unit}".rstrip() in errors
     assert f"noise of a run speed 2.0 % and angle 0.1 {unit}".rstrip() in errors
