@@ -30,7 +30,7 @@ from sim.motion.response import responses
 from sim.motion.steady import steady
 from sim.solve.march import YAW, X, Y
 
-_TOLERANCE, _MESHES = 1e-4, (4, 6)  # of the curves; differences of them count
+_TOLERANCE, _MESHES = 3e-4, (4, 6)  # of the curves: at 1e-3 they are rough in the numbers of a robot
 _COARSE = 1e-3  # tolerance of non-local effects
 _END = 1e-9  # of a dwell
 _STEP = 0.02  # of `_size`, for slopes of lags
