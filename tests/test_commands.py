@@ -292,7 +292,7 @@ def softflagella_calibrate(made: Path, out: Path) -> str:
     assert json.loads((out / "out" / "verdict.json").read_text())["verdict"] == "none"
     assert load_robot(out / "out" / "corrected.toml").C_t == pytest.approx(3.1, rel=0.1)
     assert "<svg" in (out / "out" / "report.html").read_text()
-    return "No effect is missing that these runs can show"
+    return "Nothing is missing that these runs can show. [nothing beyond noise]"
 
 
 def calibration_simulate(made: Path, out: Path) -> str:

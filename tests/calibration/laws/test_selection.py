@@ -70,7 +70,7 @@ def test_a_law_is_beyond_all_draws_and_its_place_is_first() -> None:
 
 def in_report(laws: Laws) -> str:
     """The sections of a report with laws."""
-    record = none().facts | {"next_steps": [], "laws": {**laws.to_dict(), "beside": ""}, "path": None}
+    record = none().to_dict() | {"next_steps": [], "laws": {**laws.to_dict(), "beside": ""}, "path": None}
     return " ".join(sections(record, {}).split())
 
 

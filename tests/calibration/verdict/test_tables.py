@@ -113,7 +113,7 @@ def test_a_single_session_gives_a_weaker_conclusion() -> None:
     result = calibrated(table, few=True)
     assert result.effects == (DRAG,)
     assert any("1 session" in limit for limit in result.caveats)
-    assert "block" in result.split.names
+    assert ", part " in result.split.names
     table = toy_table(5).assign(session="one")
     table["R_yr_cm"] *= 1.03  # what shifts all runs of a session is no evidence
     table["omega_h_rpm"] *= 0.98
