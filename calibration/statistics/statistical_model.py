@@ -83,7 +83,7 @@ class ForwardModel(Protocol):
 
     @property
     def coefficients(self) -> tuple[Parameter, ...]:
-        """Always fitted, without a prior."""
+        """Always fitted, mostly without a prior."""
         ...
 
     @property

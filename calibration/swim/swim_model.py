@@ -32,6 +32,7 @@ from common.arrays import Flags, Floats
 from common.errors import InputError
 from sim.model.robot import Robot
 
+_AS_GIVEN = 0.5  # σ of the logarithm of a coefficient: a swim of two tails hardly tells its scale
 _ASKEW = math.radians(3.0)  # σ of the angle of a marker
 
 
@@ -48,7 +49,8 @@ class SwimModel:
 
     @property
     def coefficients(self) -> tuple[Parameter, ...]:
-        return (*self.robot.coefficients, *self.sight.coefficients)
+        own = (replace(p, sigma=_AS_GIVEN) for p in self.robot.coefficients)
+        return (*own, *self.sight.coefficients)
 
     @property
     def nuisances(self) -> tuple[Parameter, ...]:
