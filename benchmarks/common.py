@@ -52,6 +52,12 @@ def in_parallel(
     return list(Parallel(n_jobs=available_jobs(), verbose=0 if quiet else 1)(calls))
 
 
+def as_they_end(work: Callable[..., Result], cases: Iterable[tuple[Any, ...]]) -> Iterator[Result]:
+    """Call `work` with the arguments of each case, and yield each result when it is there."""
+    calls = (delayed(work)(*case) for case in cases)
+    return iter(Parallel(n_jobs=available_jobs(), return_as="generator_unordered")(calls))
+
+
 class Records:
     """Records of a long benchmark by `key`, one JSON object a line of a file; without a file, kept in memory."""
 

@@ -23,7 +23,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 import softflagella as sf
-from benchmarks.common import Records, heading, in_parallel, per_cent, row, two_quantiles
+from benchmarks.common import Records, as_they_end, heading, per_cent, row, two_quantiles
 from calibration.swimmer.influences import TRACKED_POINT, influences
 from calibration.verdict.verdict import Verdict
 from common.errors import InputError
@@ -31,7 +31,6 @@ from planner.planning.plan import Plan
 from sim.knowledge import COEFFICIENTS, CalibrationKnowledge
 from sim.model.robot import Robot
 from sim.motion.warm import compile_once
-from sim.threads import available_jobs
 from tests.oracles.drawn_swims import LabSwim, drawn_swim
 from tests.oracles.swim_scores import SwimScores, sized
 from tests.oracles.swims import CameraNoise, make_track
@@ -146,10 +145,9 @@ def report(records: list[dict[str, Any]]) -> None:
 
 def main(robots: str = "20", first: str = "0", file: str = "") -> None:
     compile_once()
-    records, jobs = Records(file, key="swim"), available_jobs()
+    records = Records(file, key="swim")
     seeds = range(int(first), int(first) + int(robots))
     work = [(case, seed) for seed in seeds for case in (_NOTHING, _EFFECT) if f"{case} {seed}" not in records]
-    for begin in range(0, len(work), 2 * jobs):
-        for record in in_parallel(said, work[begin : begin + 2 * jobs], quiet=True):
-            records.add(record)
+    for record in as_they_end(said, work):
+        records.add(record)
     report(records.all)

@@ -4,8 +4,9 @@ Every effect that the runs can test is a candidate. If its score exceeds the cri
 (`calibration.statistics.residual_tests`), with a sign that its bounds allow, the effect is fitted together with
 the coefficients, and judged by `calibration.attribution.rules`.
 
-Scores hold near the fit only. If a coefficient ran to an end of its range because an effect is missing, scores say
-nothing. Then every effect is fitted, starting from the model as given.
+Scores hold near the fit only. Where a fit did not converge, they are those of the rough model, if there is one. If
+a coefficient ran to an end of its range because an effect is missing, scores say nothing. Then every effect is
+fitted, starting from the model as given.
 
 Kept effects cannot be told apart if their deviances differ by less than one parameter can gain by chance (6.63).
 If no single effect is kept, a second one is looked for beside each of the best few.
@@ -33,6 +34,28 @@ from calibration.statistics.study import Study
 FIRST = 3  # number of single effects to which a second one is added
 _DRAWS = 400  # of the bootstrap, for the residual that an effect leaves
 _MARGIN = 0.01  # share of the range of a number that is its end
+
+
+def where_scores_hold(study: Study, fitted: Fit) -> tuple[Study, Fit]:
+    """Return the study and the fit whose scores say what is missing: of a rough model for a fit that is far."""
+    rough = getattr(study.model, "rough", None)
+    if rough is None or fitted.converged:
+        return study, fitted
+    used, wrong = study.split.fitted, fitted.wrong_numbers
+    near = fit(rough, fitted.parameters, fitted.names, used, wrong_numbers=wrong, title="")
+    return replace(study, model=rough), near
+
+
+def scores(study: Study, fitted: Fit, effects: Sequence[Parameter], tangents: Directions) -> tuple[Misfit, Fit]:
+    """Test the residual of a fit, with scores of effects where they hold, and return the fit there.
+
+    Args:
+        tangents: directions of the effects at the fit.
+    """
+    there, near = where_scores_hold(study, fitted)
+    if near is not fitted:
+        tangents = directions(there.model, near.parameters, effects, quick=True)
+    return examine_residual(there, near, tangents), near
 
 
 def scored(
@@ -76,6 +99,7 @@ def examine(
     directions: Directions,
     *,
     threshold: float | None = None,
+    near: Fit | None = None,
     beside: tuple[Parameter, ...] = (),
     single: float = math.inf,
     after_first: Callable[[int, float], None] | None = None,
@@ -84,20 +108,22 @@ def examine(
 
     Args:
         base: the fit without them.
-        misfit: of its residual.
-        directions: of the effects there.
+        misfit: of its residual, or of that of `near`.
+        directions: of the effects at `base`.
         threshold: |z| that a fit needs; the critical one of `misfit` if not given.
+        near: the fit whose scores they are (`where_scores_hold`), by default `base`.
         beside: effects that `base` has already.
         single: extended BIC of the best single effect, which a pair must not cost.
         after_first: is told, after the first fit, how many there are, and the processor time of this one.
     """
     needed = misfit.critical_z if threshold is None else threshold
     effects = [e for e in study.effects if e not in beside]
-    local = coefficients_within_range(study.model, base.parameters)
+    near = near or base
+    local = coefficients_within_range(study.model, near.parameters)
     testable = misfit.scores.survived >= TESTABLE
     largest = float(np.max(np.abs(misfit.scores.z), where=testable, initial=0.0))
     trial = Trial(study, base, {}, needed, largest, study.noise_at_most(len(base.names)), single)
-    candidates = scored(misfit, base, effects, needed, beside)
+    candidates = scored(misfit, near, effects, needed, beside)
     if local:
         candidates = [judge(candidate, trial, RULES, Stage.SCORE) for candidate in candidates]
     wanted = sum(c.reason is Reason.NOT_NEEDED for c in candidates)
@@ -107,7 +133,7 @@ def examine(
     for j in tqdm(order, desc=title, unit="effect", delay=1.0, disable=not study.progress or None):
         candidate, began = candidates[j], clock()
         if candidate.reason is Reason.NOT_NEEDED:
-            candidate = _fitted(study, base, candidate, float(misfit.second[j]), local=local)
+            candidate = _fitted(study, near, candidate, float(misfit.second[j]), local=local)
             if candidate.fit:
                 measures = measures_of(study, base, directions.without(j))
                 candidate = judge(candidate, replace(trial, measures=measures), RULES)
@@ -187,8 +213,8 @@ def pairs(study: Study, candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
             continue
         others = [e for e in study.effects if e.name != first.effect.name]
         tangents = directions(study.model, first.fitted.parameters, others, title=title, quick=True)
-        misfit = examine_residual(again, first.fitted, tangents)
-        second += examine(again, first.fitted, misfit, tangents, beside=first.added, single=single)
+        misfit, near = scores(again, first.fitted, others, tangents)
+        second += examine(again, first.fitted, misfit, tangents, near=near, beside=first.added, single=single)
     judged: dict[frozenset[str], Hypothesis] = {}
     for pair in second:  # each is met from both sides
         names = frozenset(e.name for e in pair.added)

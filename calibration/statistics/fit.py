@@ -67,6 +67,7 @@ _NOTHING = 0.01  # change in per cent, or in the unit in which it is shown, that
 _STATED = 100.0  # change of a logarithm that is stated
 _MOST_STEPS = 60
 _STEPS_TO_TARGET = 25  # of a search that is above its target, or came to where the model cannot be solved quickly
+_STEPS_FROM_NEAR = 14  # the same, where it begins near the solution, if there is one
 _TRIED = 4  # steps before a search is given up
 _SHORT = 0.1  # after a shorter step, in ln C or ε, the Jacobian is used once more
 _SMALL = 0.01  # the iteration ends at a step that is expected to reduce rᵀ Σ⁻¹ r by less, over that of noise
@@ -75,6 +76,7 @@ _PASSES = 3  # iterations for the scatter of the sessions
 _ESTIMATES = 4  # of that scatter in a search
 _NEAR = 10.0  # a fit is near its solution if a step is expected to reduce rᵀ Σ⁻¹ r by less, over that of noise
 _DAMPING = (0.0, *(10.0 ** (e / 2) for e in range(-6, 17)))  # λ; a step is up to √10 shorter than it may be
+_FAR = 1.5  # rᵀ Σ⁻¹ r over that of noise, of a model that is wrong or a start that is far
 _NEARER = 5  # starts that are tried
 _PROBE = 0.1  # share of a step at which the curvature of the model is seen
 _MOST_BENT = 0.375  # largest share of a step by which it is bent
@@ -295,7 +297,13 @@ def fit(
     run_covariance, repeats = estimated or data.noise(used)
     problem = _Problem(model, fitted, used, run_covariance, in_sigma, title)
     with limited_as_one():
-        point, session_ratio = _descend(problem, problem.first(dict(start)), target)
+        point = problem.first(dict(start))
+        search = _Search(target)
+        if rough := getattr(model, "rough", None):
+            if not estimated and problem.above(point) > 0:
+                point = _nearer(problem, point, rough)
+            search = _Search(min(target, problem.far), steps=_STEPS_FROM_NEAR)
+        point, session_ratio = _descend(problem, point, search)
         stopped = spent()
     at_end = problem.normal(point, session_ratio)
     ahead = bounded_step(fitted, point.parameters, at_end)
@@ -385,6 +393,16 @@ class _Problem:
         level = float(normal[-1, -1]) / max(runs.values(self.used) - len(self.fitted), 1)
         return max(level, 1.0 if runs.noise_known else _EXACT)
 
+    @property
+    def far(self) -> float:
+        """A value of rᵀ W r that noise does not reach."""
+        return _FAR * self.model.runs.values(self.used)
+
+    def above(self, point: _Point) -> float:
+        """Compute by how much rᵀ W r is above `far`; infinite where the model is not solved."""
+        normal = self.normal(point, point.products.session_ratio(passes=0))
+        return float(normal[-1, -1]) - self.far if point.solved else math.inf
+
     def first(self, parameters: dict[str, float]) -> _Point:
         """Run the model at the start; effects move towards their null while it cannot be solved quickly there."""
         tried, effects = dict(parameters), self.effects
@@ -451,11 +469,29 @@ class _FitStep(NamedTuple):
     damping: int  # place of its λ in _DAMPING
 
 
-def _descend(problem: _Problem, point: _Point, target: float) -> tuple[_Point, Floats]:
+class _Search(NamedTuple):
+    """When a search ends."""
+
+    target: float = math.inf  # of rᵀ W r; it ends where the steps that are left cannot reach it
+    steps: int = _STEPS_TO_TARGET  # to the target
+    small: float = _SMALL  # promise of a step, over rᵀ W r of noise
+
+
+def _nearer(problem: _Problem, point: _Point, rough: ForwardModel) -> _Point:
+    """Return a point near the minimum of a rough model, where it fits better than a point does."""
+    roughly = replace(problem, model=rough)
+    begin = roughly.at(point.parameters, None, 1, quick=bool(problem.effects))
+    if not begin.solved:
+        return point
+    end = _descend(roughly, begin, _Search(small=_NEAR))[0]
+    return min(point, problem.at(end.parameters), key=problem.above)
+
+
+def _descend(problem: _Problem, point: _Point, search: _Search) -> tuple[_Point, Floats]:
     """Find the least rᵀ W r from `point`, and its ρ. A step to where the model is not solved quickly is too long.
 
     A wrong model crawls along a bent valley far above the noise. The search ends there as soon as all steps that
-    are left, with what the present one promises, would not come down to `target`.
+    are left, with what the present one promises, would not come down to its target.
     """
     fitted = problem.fitted
     least, kept = 0, False  # place of the least damping allowed; whether the derivatives are of another point
@@ -472,10 +508,10 @@ def _descend(problem: _Problem, point: _Point, target: float) -> tuple[_Point, F
             normal = problem.normal(point, session_ratio)
             step = _step(fitted, point.parameters, normal, least)
         small = _SMALL * problem.noise_level(normal)
-        if step.promise < small and count > 1:
+        if step.promise < search.small * problem.noise_level(normal) and count > 1:
             break
-        above = float(normal[-1, -1]) - target
-        if count > _TRIED and (_STEPS_TO_TARGET - count) * step.promise < above:
+        above = float(normal[-1, -1]) - search.target
+        if count > _TRIED and (search.steps - count) * step.promise < above:
             break
         if (count > _STEPS_TO_TARGET and not solved) or skipped("more steps of some fits"):
             break
@@ -648,7 +684,8 @@ def profile_end(
     def above(value: float) -> float:
         nonlocal last
         start = {**last.parameters, name: value}
-        last = fit(model, start, others, used, wrong_numbers=fitted.wrong_numbers, title="")
+        target = fitted.deviance + 2 * risen
+        last = fit(model, start, others, used, wrong_numbers=fitted.wrong_numbers, target=target, title="")
         return last.deviance - fitted.deviance - risen
 
     try:

@@ -1,9 +1,9 @@
-"""The course of a robot under the flips of a swim, for any robot near one that is simulated.
+"""The course of a robot under the flips of a swim.
 
-One robot, the base, is simulated in time steps (`sim.motion.replay`). Its motion in a dwell is that of the
-planner's vehicle (`planner.vehicle.vehicle`), lag and arc, and a small rest, which the vehicle leaves out. Other
-robots have vehicles of their own, and the rest of the base. So what a number changes costs a hundredth of a
-second. The rest of another robot has another phase of the disc at each flip: it counts as noise where it differs.
+The motion in a dwell is that of the planner's vehicle (`planner.vehicle.vehicle`), lag and arc, with its lag from
+the first pictures after a flip on. So what a number changes costs a hundredth of a second, where time steps take
+seconds. What the vehicle leaves out is the phase of the disc at each flip, which nobody knows after some turns: it
+counts as random steps.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from sim.effects import effect_named, is_effect
 from sim.inputs import check_columns
 from sim.mechanics import planar
 from sim.model.groups import Groups
-from sim.model.schedule import Schedule
-from sim.motion.replay import stretches
+from sim.model.response import BEFORE, DWELLS
 from sim.motion.response import responses
 from sim.motion.steady import steady
-from sim.solve.march import YAW, X, Y
 
 _TOLERANCE, _MESHES = 3e-4, (4, 6)  # of the curves: at 1e-3 they are rough in the numbers of a robot
 _COARSE = 1e-3  # tolerance of non-local effects
-_END = 1e-9  # of a dwell
+_DWELLS = np.concatenate([np.geomspace(0.02, DWELLS[0], 8)[:-1], DWELLS])  # a camera sees tails turn over
 _STEP = 0.02  # of `_size`, for slopes of lags
 _FAR = 0.1  # of `_distance`, from which slopes are simulated again
+_LONGER = 1.25  # a unit of time than that of the robot as given
+_LEAST_KNOTS = 3  # of the memory
 _BROKE = "the simulation of a swim broke down; check the robot and its motor speed"
 
 
@@ -66,9 +66,17 @@ class Vehicles:
     non-local effects, with which a flip can take minutes, lags are linear.
     """
 
+    before: Floats = field(default_factory=BEFORE.copy)  # dwells before, at which the memory is simulated
     known: dict[tuple[_Columns, int, float], Lags] = field(default_factory=dict)  # by robot, direction, tolerance
     slopes: dict[tuple[_Columns, str, int], Lags] = field(default_factory=dict)  # by robot, column, direction
     centres: list[_Columns] = field(default_factory=list)  # robots of slopes
+
+    @classmethod
+    def of(cls, swims: Sequence[MeasuredSwim], time: float) -> Vehicles:
+        """Make them for the dwells of swims; `time` is the unit of time of one robot, those of others are near."""
+        shortest = min(float(swim.dwells[:-1].min(initial=np.inf)) for swim in swims) / time
+        least = int(np.searchsorted(BEFORE, shortest / _LONGER, side="right")) - 1
+        return cls(BEFORE[min(max(least, 0), len(BEFORE) - _LEAST_KNOTS) :])
 
     def swimming(
         self, columns: Mapping[str, Floats], pairs: Integers, time: Floats, length: Floats, *, close: bool
@@ -125,15 +133,17 @@ class Vehicles:
 
     def _simulated(self, wanted: Sequence[tuple[_Columns, int]], tolerance: float = _TOLERANCE) -> list[Lags]:
         """Simulate the lags of robots, each in one direction of its motor, unless they are known."""
+        wanted = [(robot, 1 if _even(robot) else sense) for robot, sense in wanted]
         if new := [each for each in dict.fromkeys(wanted) if (*each, tolerance) not in self.known]:
             robots = [dict(robot) for robot, _ in new]
             names = sorted({name for robot in robots for name in robot})
             columns = {name: np.array([robot.get(name, _null(name)) for robot in robots]) for name in names}
             columns["omega_bar"] = columns["omega_bar"] * np.array([sense for _, sense in new])
-            curves = responses(Groups.from_columns(check_columns(columns)), tolerance=tolerance, meshes=_MESHES)
+            groups, of = Groups.from_columns(check_columns(columns)), {"before": self.before, "dwells": _DWELLS}
+            curves = responses(groups, tolerance=tolerance, meshes=_MESHES, **of)
             if curves.failed.any():
                 raise InputError(_BROKE)
-            tables = lag_table(curves.lag, curves.memory, curves.before), resampled(curves.rest)
+            tables = lag_table(curves.lag, curves.memory, **of), resampled(curves.rest, _DWELLS)
             self.known.update(((*each, tolerance), Lags(*of)) for each, *of in zip(new, *tables, strict=True))
         return [self.known[*each, tolerance] for each in wanted]
 
@@ -162,6 +172,11 @@ class Vehicles:
 
 def _null(name: str) -> float:
     return float(effect_named(name).null) if is_effect(name) else 0.0
+
+
+def _even(robot: _Columns) -> bool:
+    """Tell whether a reversed motor gives the mirror image."""
+    return all(effect_named(name).symmetry == "even" for name, _ in robot if is_effect(name))
 
 
 def _nonlocal(name: str) -> bool:
@@ -236,11 +251,6 @@ class Moments:
         """Whether the motor turns forward, (n,)."""
         return np.asarray((self.dwell % 2 == 0) == (self.first_direction > 0))
 
-    @property
-    def place(self) -> Floats:
-        """Dwells since the start, with the share of the present one, (n,)."""
-        return np.asarray(self.dwell + np.clip(self.elapsed / self.dwells[self.dwell], 0.0, 1 - _END))
-
     def changes(self, of: Swimming) -> Floats:
         """Compute the changes of the pose since the flip, (n, 3), in l and rad, of a vehicle."""
         result = np.empty((len(self.dwell), 3))
@@ -251,35 +261,6 @@ class Moments:
             first = rows & (self.dwell == 0)
             result[first] = of.vehicle.motion(sense, None, elapsed[first])
         return result
-
-
-@dataclass(frozen=True)
-class Base:
-    """A robot that is simulated in time steps along a swim, and what its vehicle leaves out."""
-
-    place: Floats  # (S,) dwells since the start, see `Moments.place`
-    rest: Floats  # (S, 3), added to the changes of the vehicle, in l and rad
-
-    @classmethod
-    def of(cls, swim: MeasuredSwim, robot: Swimming) -> Base:
-        """Simulate a robot along a swim."""
-        dwells = swim.dwells / robot.time
-        schedule = Schedule(robot.columns, swim.first_direction, dwells, (0.0, 0.0, 0.0), robot.time)
-        simulated = [each for each in stretches(schedule) if len(each.times)]
-        dwell = np.concatenate([np.full(len(each.times), each.dwell) for each in simulated])
-        poses = np.concatenate([each.poses[:, [X, Y, YAW]] for each in simulated])
-        ends = np.concatenate([np.zeros((1, 3)), poses[np.flatnonzero(np.diff(dwell, append=-1))]])
-        elapsed = np.concatenate([each.times for each in simulated]) * robot.time
-        at = Moments(dwell, elapsed - (swim.flips - swim.flips[0])[dwell], swim.dwells, swim.first_direction)
-        rest = planar.between(ends[dwell], poses) - at.changes(robot)
-        marks = np.arange(len(swim.dwells), dtype=float)
-        place = np.concatenate([at.place, marks])
-        order = np.argsort(place, kind="stable")
-        return cls(place[order], np.concatenate([rest, np.zeros((len(marks), 3))])[order])
-
-    def at(self, place: Floats) -> Floats:
-        """Interpolate the rest at places (n,), (n, 3)."""
-        return np.stack([np.interp(place, self.place, column) for column in self.rest.T], -1)
 
 
 def course(vehicle: Vehicle, changes: Floats, ends: Floats, at: Moments) -> tuple[Floats, Floats]:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from calibration.statistics.statistical_model import Parameter, Parameters
-from calibration.swim.course import Base, Moments, Swimming, course
+from calibration.swim.course import Moments, Swimming, course
 from calibration.swim.swim_runs import SwimRuns, first_of_last
 from calibration.swimmer.influences import CAMERA, CURRENT, HEADING
 from common.arrays import Floats
@@ -39,7 +39,6 @@ class Sight:
     """How the swims of some runs are seen."""
 
     runs: SwimRuns
-    bases: tuple[Base, ...] = ()  # of the swims; none: what the vehicle leaves out counts as zero
 
     @cached_property
     def coefficients(self) -> tuple[Parameter, ...]:
@@ -101,9 +100,6 @@ class Sight:
             own, moment = runs.session == place, swim.time - value[CLOCK]
             moments, whole = Moments.of(swim, moment), Moments.whole(swim)
             changes, ends = (of.changes(robot) for of in (moments, whole))
-            if self.bases:
-                changes = changes + self.bases[place].at(moments.place)
-                ends = ends + self.bases[place].at(whole.place)
             for each in (changes, ends):
                 each[:, :2] *= robot.length
             poses, flips = course(robot.vehicle, changes, ends, moments)

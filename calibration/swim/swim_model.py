@@ -1,8 +1,7 @@
 """A robot and its swims as a model for the calibration: what was seen of a path tells what the model lacks.
 
 The numbers and effects of the robot are those of `calibration.swimmer`, the poses those of
-`calibration.swim.sight`. The base of the courses is the robot as given: a fit that lacks an effect is farther from
-the truth. The noise is that of `calibration.swim.free_vehicle`, which knows no robot.
+`calibration.swim.sight`. The noise is that of `calibration.swim.free_vehicle`, which knows no robot.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ import numpy as np
 from calibration.statistics.budget import count_predictions
 from calibration.statistics.forward import central
 from calibration.statistics.statistical_model import Parameter, Parameters, Predict, start_values
-from calibration.swim.course import Base, Swimming, Vehicles
+from calibration.swim.course import Swimming, Vehicles
 from calibration.swim.free_vehicle import with_noise
 from calibration.swim.measured_swim import MeasuredSwim
 from calibration.swim.pose_noise import Sizes
@@ -33,6 +32,7 @@ from common.errors import InputError
 from sim.model.robot import Robot
 
 _AS_GIVEN = 0.5  # σ of the logarithm of a coefficient: a swim of two tails hardly tells its scale
+_ROUGH = np.array([0.003, 0.01])  # l, rad: a step, with which a fit finds its way from far
 _ASKEW = math.radians(3.0)  # σ of the angle of a marker
 
 
@@ -66,6 +66,18 @@ class SwimModel:
         fitted = {p.title for p in self.sight.coefficients}
         return {title: why for title, why in self.robot.untestable.items() if title not in fitted}
 
+    @property
+    def rough(self) -> SwimModel | None:
+        """The same model with large steps, by which changes of the pose are compared rather than poses.
+
+        The path then is no more than the sum of what each dwell does, and a fit does not crawl along bent valleys.
+        """
+        runs, noise = self.runs, self.runs.noise_of_poses
+        if noise is None or (noise.sizes.step >= _ROUGH).all():
+            return None
+        runs = runs.in_noise(noise.sizes._replace(step=np.maximum(noise.sizes.step, _ROUGH)), runs.raw(runs.y))
+        return replace(self, sight=replace(self.sight, runs=runs), runs=runs)
+
     def check(self, prediction: Floats) -> None:
         """Accept poses in any units that they name: a start is fitted."""
 
@@ -88,7 +100,10 @@ class SwimModel:
         assert noise is not None
         runs, _ = runs_of_swims([of.swim], of.robot.tail_length)
         inner = SwimmerModel(of.robot, _both_directions(of.robot), self.robot.jobs)
-        model = replace(self, robot=inner, sight=Sight(runs), runs=runs, began={})
+        vehicles = Vehicles.of([of.swim], of.robot.time_scale)
+        if len(vehicles.before) <= len(self.vehicles.before):
+            vehicles = self.vehicles
+        model = replace(self, robot=inner, sight=Sight(runs), runs=runs, vehicles=vehicles, began={})
         start = start_values(model)
         units = np.array([self.runs.length / of.robot.tail_length, 1.0])
         sizes = noise.sizes._replace(**{name: units * getattr(noise.sizes, name) for name in Sizes._fields[:3]})
@@ -117,12 +132,6 @@ class SwimModel:
         length, time = (np.broadcast_to(x, same.shape)[:, 0] for x in (inputs.view.length, inputs.view.time))
         return self.vehicles.swimming(columns, same, time, length, close=self.around)
 
-    def based(self, at: Parameters) -> SwimModel:
-        """Simulate the robot at some parameters along all swims, as the base of all others."""
-        (base,) = self.swimming([at])
-        bases = tuple(Base.of(swim, base) for swim in self.runs.swims)
-        return replace(self, sight=replace(self.sight, bases=bases))
-
 
 def swim_model(robot: Robot, swims: Sequence[MeasuredSwim], *, jobs: int | None = None) -> tuple[SwimModel, Flags]:
     """Make the model of a robot's swims, with the noise of the poses.
@@ -132,9 +141,9 @@ def swim_model(robot: Robot, swims: Sequence[MeasuredSwim], *, jobs: int | None 
     """
     runs, held_out = runs_of_swims(swims, robot.tail_length)
     used = ~runs.left_out(held_out)
-    model = SwimModel(SwimmerModel(robot, _both_directions(robot), jobs), Sight(runs), runs)
+    vehicles = Vehicles.of(swims, robot.time_scale)
+    model = SwimModel(SwimmerModel(robot, _both_directions(robot), jobs), Sight(runs), runs, vehicles)
     start = start_values(model)
-    model = model.based(start)
     (given,) = model.swimming([start])
     runs, seen = with_noise(model.sight, given, used)
     began = {**start, **seen}

@@ -20,7 +20,7 @@ from typing import cast
 
 from calibration.attribution.attribution import Attribution
 from calibration.attribution.claim_checks import with_checks
-from calibration.attribution.effects import FIRST, ebic, examine, explaining, pairs, scored
+from calibration.attribution.effects import FIRST, ebic, examine, explaining, pairs, scored, scores
 from calibration.attribution.hypothesis import Hypothesis, Reason
 from calibration.attribution.moves import find_moves, groups_that_may_differ
 from calibration.attribution.rules import IMPLAUSIBLE, INDISTINGUISHABLE
@@ -117,7 +117,8 @@ def explain(study: Study, base: Fit) -> Attribution:
         gain = base.deviance - number.fitted.deviance
         threshold = min(threshold, math.sqrt(max(gain - INDISTINGUISHABLE, 1.0)))
     forecast = _forecast(study, began, tested - began.seconds, _SHARE_OF_TEST * (tested - derived))
-    candidates = examine(study, base, misfit, tangents, threshold=threshold, after_first=forecast)
+    seen, near = (misfit, base) if base.converged else scores(study, base, study.effects, tangents)
+    candidates = examine(study, base, seen, tangents, threshold=threshold, near=near, after_first=forecast)
     attribution = replace(attribution, candidates=tuple(candidates))
     best = explaining(candidates)
     if number and number.kept and not (best and _fits_better(best[0], number)):

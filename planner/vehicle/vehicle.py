@@ -150,28 +150,31 @@ def _step_below(time: Floats) -> tuple[Integers, Floats]:
     return i, (place - i)[..., None]
 
 
-def resampled(curve: Floats) -> Floats:
-    """Resample curves (..., D, 3) over DWELLS at TIMES, (..., T, 3), by a cubic spline in ln T.
+def resampled(curve: Floats, dwells: Floats = DWELLS) -> Floats:
+    """Resample curves (..., D, 3) over dwells (D,) at TIMES, (..., T, 3), by a cubic spline in ln T.
 
     Below the shortest dwell the curve is a straight line to zero; after SETTLED it is constant.
     """
-    places = np.log(np.maximum(TIMES, DWELLS[0]))
-    spline = CubicSpline(np.log(DWELLS), curve, axis=-2)(places)
-    return np.asarray(spline * np.minimum(TIMES / DWELLS[0], 1.0)[:, None])
+    places = np.log(np.maximum(TIMES, dwells[0]))
+    spline = CubicSpline(np.log(dwells), curve, axis=-2)(places)
+    return np.asarray(spline * np.minimum(TIMES / dwells[0], 1.0)[:, None])
 
 
-def lag_table(lag: Floats, memory: Floats, before: Floats = BEFORE) -> Floats:
+def lag_table(lag: Floats, memory: Floats, before: Floats = BEFORE, dwells: Floats = DWELLS) -> Floats:
     """Compute lags (..., K, T, 3) after dwells of BEFORE_KNOTS.
 
     Args:
         lag: (..., D, 3), a curve of `sim.model.response`.
-        memory: (..., B, D, 3), what is added to it after dwells `before`.
+        memory: (..., B, D, 3), what is added to it after dwells `before`; after shorter ones as after the first.
         before: (B,).
+        dwells: (D,).
     """
     knots = np.log(np.append(before, FORGOTTEN))
     known = np.concatenate([memory, np.zeros_like(memory[..., :1, :, :])], -3)
-    fine = CubicSpline(knots, known, axis=-3, bc_type=("not-a-knot", "clamped"))(np.log(BEFORE_KNOTS))
-    return resampled(lag[..., None, :, :] + fine)
+    fine = CubicSpline(knots, known, axis=-3, bc_type=("not-a-knot", "clamped"))(
+        np.log(np.maximum(BEFORE_KNOTS, before[0]))
+    )
+    return resampled(lag[..., None, :, :] + fine, dwells)
 
 
 @dataclass(frozen=True)

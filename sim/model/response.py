@@ -36,7 +36,7 @@ SETTLED = 2.0  # time units after a flip from which the lag is constant
 @dataclass(frozen=True)
 class Responses:
     """Response of B robots, over D dwells and K dwells before; lags are (Δz, Δx, Δψ) in l, l, rad; NaN if
-    failed."""
+    failed. The net speed is NaN for dwells shorter than the first before."""
 
     lag: Floats  # (B, D, 3)
     memory: Floats  # (B, K, D, 3), added to the lag
@@ -48,9 +48,9 @@ class Responses:
     before: Floats = field(default_factory=BEFORE.copy)  # (K,), T̄ of the dwell before, of `memory`
 
 
-def at_equal_dwells(memory: Floats, knots: Floats = BEFORE) -> Floats:
+def at_equal_dwells(memory: Floats, knots: Floats = BEFORE, dwells: Floats = DWELLS) -> Floats:
     """Interpolate memory (..., K, D, 3) where the dwell before is as long as the dwell, (..., D, 3)."""
-    return np.stack([memory_after(memory, dwell, knots)[..., i, :] for i, dwell in enumerate(DWELLS)], -2)
+    return np.stack([memory_after(memory, dwell, knots)[..., i, :] for i, dwell in enumerate(dwells)], -2)
 
 
 def memory_after(memory: Floats, before: float, knots: Floats = BEFORE) -> Floats:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from common.arrays import Floats
+from common.arrays import Floats, Integers
 from sim.effects import check_effects, effect_named
 from sim.mechanics import planar
 from sim.mechanics.geometry import straight
@@ -33,8 +33,6 @@ MESHES = (6, 9)  # edges
 TOLERANCE = 1e-3  # of a time step, in l: see `sim.solve.transient`
 _LEAST_INSTANTS = {1: 3, 2: 3}  # by N; with more tails the phase at the flip hardly matters
 _OFFSET = 1  # of a robot's numbers
-_TIMES = np.unique([*np.minimum(DWELLS, SETTLED), *np.minimum(DWELLS, _SAME)])
-_UNTIL_SETTLED, _UNTIL_SAME = (np.searchsorted(_TIMES, np.minimum(DWELLS, end)) for end in (SETTLED, _SAME))
 
 
 class _Wanted(NamedTuple):
@@ -43,6 +41,17 @@ class _Wanted(NamedTuple):
     tails: int
     even: bool  # a reversed motor gives the mirror image
     tolerance: float
+    before: Floats  # (K,)
+    dwells: Floats  # (D,)
+
+    @property
+    def times(self) -> Floats:
+        """Times at which the lag is simulated, (T,)."""
+        return np.unique([np.minimum(self.dwells, end) for end in (SETTLED, _SAME)])
+
+    def until(self, end: float) -> Integers:
+        """Return the places of the dwells in `times`, those after `end` at that one, (D,)."""
+        return np.searchsorted(self.times, np.minimum(self.dwells, end))
 
 
 @np.errstate(all="ignore")  # robots that overflow are flagged
@@ -54,6 +63,8 @@ def responses(
     tolerance: float = TOLERANCE,
     meshes: tuple[int, int] = MESHES,
     extrapolated_memory: bool = False,
+    before: Floats = BEFORE,
+    dwells: Floats = DWELLS,
 ) -> Responses:
     """Simulate the response of B robots of one N to a flip of the motor.
 
@@ -66,11 +77,13 @@ def responses(
             time unit in the curves.
         meshes: edges of a tail on the two meshes; errors go as 1/n², extrapolated.
         extrapolated_memory: extrapolate the memory, too; it takes half as long again.
+        before: dwells before at which the memory is simulated, (K,), increasing.
+        dwells: of the curves, (D,), increasing.
     """
     check_effects(groups.effects)
     motion = steady(groups, stability=False) if motion is None else motion
     even = all(effect_named(name).symmetry == "even" for name in groups.effects)
-    wanted = _Wanted(groups.N, even, tolerance)
+    wanted = _Wanted(groups.N, even, tolerance, before, dwells)
     rows, reverse_rows = numbers(groups), numbers(groups.reversed())
     both = history and extrapolated_memory
     solved = [
@@ -87,7 +100,7 @@ def responses(
             robot = groups.select(np.array([i]))
             body, reverse = bodies(robot)[0], bodies(robot.reversed())[0]
             curves = stepped_response(
-                body, groups.N, DWELLS, BEFORE, reverse=reverse, history=history, settled=SETTLED
+                body, groups.N, dwells, before, reverse=reverse, history=history, settled=SETTLED
             )
         by_robot.append(curves)
     lag, memory, rest, spread = (np.array(column) for column in zip(*by_robot, strict=True))
@@ -95,11 +108,11 @@ def responses(
     twist = twists(motion.v_z, motion.v_x, motion.omega_yr, sense)
     if not history:
         memory[:], rest[:] = np.nan, np.nan
-    speed = net_speeds(twist, lag, memory)
+    speed = net_speeds(twist, lag, memory, before, dwells)
     failed = ~np.isfinite(speed[:, -1])
     for array in (lag, memory, rest, spread, speed):
         array[failed] = np.nan
-    return Responses(lag, memory, rest, spread, speed, failed, stepped)
+    return Responses(lag, memory, rest, spread, speed, failed, stepped, before)
 
 
 def _on_meshes(
@@ -162,19 +175,20 @@ def _on_mesh(
         Flip(row, start.x, start.u, orbit.twist, SETTLED) if orbit and start else None
         for row, orbit, start in zip(rows, after, starts, strict=True)
     ]
-    courses = follow_flips(flips, _TIMES, wanted.tolerance)
+    courses = follow_flips(flips, wanted.times, wanted.tolerance)
+    rest = np.zeros((len(wanted.dwells), 3))
     pasts: list[tuple[Floats, Floats] | None]
-    pasts = [(np.zeros((len(BEFORE), len(DWELLS), 3)), np.zeros((len(DWELLS), 3)))] * len(rows)
+    pasts = [(np.zeros((len(wanted.before), *rest.shape)), rest)] * len(rows)
     if history:
         solved = [flip if course else None for flip, course in zip(flips, courses, strict=True)]
-        same = [course.lag[_UNTIL_SAME].mean(1) if course else None for course in courses]
+        same = [course.lag[wanted.until(_SAME)].mean(1) if course else None for course in courses]
         pasts = _histories(solved, _flips_back(solved, reverse_rows, after, starts, wanted), same, wanted)
     curves: list[Curves | None] = []
     for course, past in zip(courses, pasts, strict=True):
         if course is None or past is None:
             curves.append(None)
         else:
-            lag = course.lag[_UNTIL_SETTLED]
+            lag = course.lag[wanted.until(SETTLED)]
             curves.append(Curves(lag.mean(1), *past, lag.std(1)))
     return curves
 
@@ -187,7 +201,7 @@ def _flips_back(
     wanted: _Wanted,
 ) -> list[Flip | None]:
     """Flip from the steady motion after the flip; an even robot's flip back is the mirror image of its flip."""
-    last = float(BEFORE[-1])
+    last = float(wanted.before[-1])
     if wanted.even:
         return [flip and flip._replace(until=last) for flip in flips]
     return [
@@ -206,24 +220,24 @@ def _histories(
         back: flips in the other direction.
         same: lag after a long dwell, at DWELLS up to the time from which the memory is constant, (D, 3).
     """
-    count = len(BEFORE)
+    count = len(wanted.before)
     later: list[Flip | None] = []
-    for flip, course in zip(flips, follow_flips(back, _TIMES, wanted.tolerance, BEFORE), strict=True):
+    for flip, course in zip(flips, follow_flips(back, wanted.times, wanted.tolerance, wanted.before), strict=True):
         if flip is None or course is None:
             later += [None] * (count + 1)
             continue
         shapes = map(mirrored, course.shapes) if wanted.even else course.shapes
         later += [flip._replace(x=shape, until=_SAME) for shape in shapes]
         later.append(flip._replace(x=straight(flip.x.shape[0], flip.x.shape[1], float(flip.numbers[_OFFSET]))))
-    courses = follow_flips(later, _TIMES, wanted.tolerance)
+    courses = follow_flips(later, wanted.times, wanted.tolerance)
     pasts: list[tuple[Floats, Floats] | None] = []
     for i, lag in enumerate(same):
         *after_short, from_rest = courses[i * (count + 1) : (i + 1) * (count + 1)]
-        lags = [course.lag[_UNTIL_SAME].mean(1) for course in after_short if course]
+        lags = [course.lag[wanted.until(_SAME)].mean(1) for course in after_short if course]
         if from_rest is None or len(lags) < count:
             pasts.append(None)
         else:
-            pasts.append((np.array(lags) - lag, from_rest.lag[_UNTIL_SETTLED].mean(1)))
+            pasts.append((np.array(lags) - lag, from_rest.lag[wanted.until(SETTLED)].mean(1)))
     return pasts
 
 

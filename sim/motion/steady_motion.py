@@ -137,15 +137,19 @@ def twists(surge: Floats, sway: Floats, yaw_rate: Floats, sense: Floats) -> Floa
     return np.stack([surge, sense * sway, sense * yaw_rate], -1)
 
 
-def net_speeds(twist: Floats, lag: Floats, memory: Floats, before: Floats = BEFORE) -> Floats:
-    """Compute the net speed (B, D) of equal dwells DWELLS.
+def net_speeds(
+    twist: Floats, lag: Floats, memory: Floats, before: Floats = BEFORE, dwells: Floats = DWELLS
+) -> Floats:
+    """Compute the net speed (B, D) of equal dwells, NaN for those shorter than the first `before`.
 
     Args:
         twist: steady twists (B, 3), as `twists` returns them.
         lag, memory: curves of the response, (B, D, 3) and (B, K, D, 3), see `sim.model.response`.
         before: T̄ of the dwell before, (K,).
+        dwells: T̄ of the curves, (D,).
     """
-    return planar.net_speed(twist[:, None], lag + at_equal_dwells(memory, before), DWELLS)
+    speed = planar.net_speed(twist[:, None], lag + at_equal_dwells(memory, before, dwells), dwells)
+    return np.where(dwells < before[0], np.nan, speed)
 
 
 def lab_columns(motion: Mapping[str, Any], length_cm: Any, time_s: Any) -> dict[str, Floats]:

@@ -66,17 +66,15 @@ def farthest(model: SwimModel, at: dict[str, float]) -> Floats:
     ("robot", "effects"), [(CONTROL, {}), (CONTROL, {"left_right_bias": 0.1}), (THREE, {"disc_drag": 0.2})]
 )
 def test_poses_are_those_of_the_simulator(robot: Robot, effects: dict[str, float]) -> None:
-    """With the base at the robot as given and coefficients off by 10 % within 0.8 mm of a path of 8 l.
+    """Within 0.8 mm and 0.3° of a path of 8 l, also just after flips.
 
     What is left is the phase of the disc at the flips.
     """
     truth, plan = changed(robot, **effects), plan_of(robot)
     model = plain_model(robot, exact_swim(truth, plan))
     at = {**start_values(model), "C_t": truth.C_t, "C_r": truth.C_r, **effects}
-    given = model.based(start_values(model))
-    assert (farthest(given, at) < [0.8, 0.8, 0.3]).all()
-    assert (farthest(given.based(at), at) < [0.05, 0.05, 0.05]).all()
-    assert farthest(given, start_values(model)).max() > 2  # the change is large
+    assert (farthest(model, at) < [0.8, 0.8, 0.3]).all()
+    assert farthest(model, start_values(model)).max() > 2  # the change is large
 
 
 @pytest.mark.slow
