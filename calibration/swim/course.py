@@ -31,7 +31,7 @@ from sim.motion.steady import steady
 _TOLERANCE, _MESHES = 3e-4, (4, 6)  # of the curves: at 1e-3 they are rough in the numbers of a robot
 _COARSE = 1e-3  # tolerance of non-local effects
 _DWELLS = np.concatenate([np.geomspace(0.02, DWELLS[0], 8)[:-1], DWELLS])  # a camera sees tails turn over
-_STEP = 0.02  # of `_size`, for slopes of lags
+_STEP = 0.1  # of `_size`, for slopes of lags; what time steps leave in them is larger than their curvature
 _FAR = 0.1  # of `_distance`, from which slopes are simulated again
 _LONGER = 1.25  # a unit of time than that of the robot as given
 _LEAST_KNOTS = 3  # of the memory
@@ -139,11 +139,11 @@ class Vehicles:
             names = sorted({name for robot in robots for name in robot})
             columns = {name: np.array([robot.get(name, _null(name)) for robot in robots]) for name in names}
             columns["omega_bar"] = columns["omega_bar"] * np.array([sense for _, sense in new])
-            groups, of = Groups.from_columns(check_columns(columns)), {"before": self.before, "dwells": _DWELLS}
-            curves = responses(groups, tolerance=tolerance, meshes=_MESHES, **of)
+            groups = Groups.from_columns(check_columns(columns))
+            curves = responses(groups, tolerance=tolerance, meshes=_MESHES, before=self.before, dwells=_DWELLS)
             if curves.failed.any():
                 raise InputError(_BROKE)
-            tables = lag_table(curves.lag, curves.memory, **of), resampled(curves.rest, _DWELLS)
+            tables = lag_table(curves.lag, curves.memory, self.before, _DWELLS), resampled(curves.rest, _DWELLS)
             self.known.update(((*each, tolerance), Lags(*of)) for each, *of in zip(new, *tables, strict=True))
         return [self.known[*each, tolerance] for each in wanted]
 

@@ -9,10 +9,15 @@ import numpy as np
 import pytest
 
 import softflagella as sf
+from calibration.attribution.effects import scores
 from calibration.report.figures import draw_residuals
 from calibration.robot.robot_verdict import RobotVerdict
+from calibration.statistics.budget import work_done
+from calibration.statistics.fit import fit
 from calibration.statistics.forward import by_differences, derivatives
+from calibration.statistics.residual_tests import directions
 from calibration.statistics.statistical_model import start_values
+from calibration.statistics.study import Study
 from calibration.swim.course import Swimming, Vehicles
 from calibration.swim.free_vehicle import with_noise
 from calibration.swim.measured_swim import MeasuredSwim, read_swims
@@ -75,6 +80,28 @@ def test_poses_are_those_of_the_simulator(robot: Robot, effects: dict[str, float
     at = {**start_values(model), "C_t": truth.C_t, "C_r": truth.C_r, **effects}
     assert (farthest(model, at) < [0.8, 0.8, 0.3]).all()
     assert farthest(model, start_values(model)).max() > 2  # the change is large
+
+
+@pytest.mark.slow
+def test_a_fit_from_far_does_not_crawl() -> None:
+    """A wrong model is soon left; its scores in large steps say what is missing, which is then found."""
+    truth, plan = changed(CONTROL, left_right_bias=0.1), plan_of(CONTROL, 3.0)
+    model, held_out = swim_model(CONTROL, read_swims(make_track(truth, plan, seed=1), plan))
+    study = Study.fitted_to(model, ~model.runs.left_out(held_out))
+    names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
+    began = work_done()
+    base = fit(model, model.guess(start_values(model), study.split.fitted), names, study.split.fitted)
+    assert not base.converged
+    tangents = directions(model, base.parameters, model.effects)
+    misfit, near = scores(study, base, model.effects, tangents)
+    assert near.converged
+    assert model.effects[int(np.argmax(np.abs(misfit.scores.z)))].name == "left_right_bias"
+    start = {**near.parameters, "left_right_bias": 0.05}
+    found = fit(model, start, (*names, "left_right_bias"), study.split.fitted)
+    assert found.converged
+    assert found.deviance < study.noise_at_most(len(found.names)) < base.deviance
+    assert found.parameters["left_right_bias"] == pytest.approx(0.1, rel=0.1)
+    assert (work_done() - began).predictions < 8000
 
 
 @pytest.mark.slow

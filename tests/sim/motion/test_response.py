@@ -47,6 +47,20 @@ def test_curves_agree_with_time_steps(omega_bar: float, changes: dict[str, float
     assert curves.spread[0, FEW] == pytest.approx(spread, abs=4e-4)
 
 
+def test_other_dwells_do_not_change_the_curves() -> None:
+    """Short dwells are on the way of the same flips; memory after a dwell does not depend on shorter ones."""
+    early = np.array([0.03, 0.1])
+    usual, found = responses(control()), responses(control(), before=BEFORE[-4:], dwells=np.append(early, DWELLS))
+    assert found.lag[:, 2:] == pytest.approx(usual.lag, abs=1e-12)
+    assert found.rest[:, 2:] == pytest.approx(usual.rest, abs=1e-12)
+    assert found.memory[:, :, 2:] == pytest.approx(usual.memory[:, -4:], abs=2e-6)  # time steps end at these
+    long = np.append([False, False], BEFORE[-4] <= DWELLS)
+    assert np.isnan(found.net_speed[:, ~long]).all()
+    assert found.net_speed[:, long] == pytest.approx(usual.net_speed[:, long[2:]], abs=1e-12)
+    stepped = stepped_response(first_body(control()), 2, early, BEFORE[-4:], resolution=FINE)
+    assert found.lag[0, :2] == pytest.approx(stepped.lag, abs=2.5e-4)
+
+
 @pytest.mark.parametrize(("tails", "ends"), [(2.0, (0.5, 2.0)), (4.0, (0.3, 0.6))])
 def test_a_random_schedule_is_the_product_of_its_responses(tails: float, ends: tuple[float, float]) -> None:
     """A replay in the lab against lag, memory and arc of every dwell, with nothing fitted."""
