@@ -20,9 +20,9 @@ are 95 %, by Student's t. The scatter ρ of a few sessions is uncertain, which l
 V′_a is half of the derivative by ρ_a and half of its mean over the outputs, since half of each ρ_a is estimated
 from all outputs (`calibration.linear.gls`).
 
-A model along which errors add up, such as a path, may have a `rough` one: the same in a noise in which they do not.
-A fit whose start leaves far more than noise begins with a fit of that one, and a model that still does so after some
-steps is given up, as one with a `target`.
+A model along which errors add up, such as a path, may have a `rough` one: the same in a noise in which they do
+not. A fit whose start leaves far more than noise begins with a fit of that one, and a model that still does so
+after some steps is given up, as one with a `target`.
 
 The deviance along one parameter, with the others refitted, may differ from a parabola. So `profile_intervals` runs
 the model at both ends of the interval that the covariance gives. Each end moves to where the deviance, as a
