@@ -36,26 +36,22 @@ _DRAWS = 400  # of the bootstrap, for the residual that an effect leaves
 _MARGIN = 0.01  # share of the range of a number that is its end
 
 
-def where_scores_hold(study: Study, fitted: Fit) -> tuple[Study, Fit]:
-    """Return the study and the fit whose scores say what is missing: of a rough model for a fit that is far."""
-    rough = getattr(study.model, "rough", None)
-    if rough is None or fitted.converged:
-        return study, fitted
-    used, wrong = study.split.fitted, fitted.wrong_numbers
-    near = fit(rough, fitted.parameters, fitted.names, used, wrong_numbers=wrong, title="")
-    return replace(study, model=rough), near
-
-
-def scores(study: Study, fitted: Fit, effects: Sequence[Parameter], tangents: Directions) -> tuple[Misfit, Fit]:
-    """Test the residual of a fit, with scores of effects where they hold, and return the fit there.
+def scores(
+    study: Study, fitted: Fit, effects: Sequence[Parameter], tangents: Directions, misfit: Misfit | None = None
+) -> tuple[Misfit, Fit]:
+    """Test the residual of a fit where its scores hold, and return the fit there: of a rough model if it is far.
 
     Args:
         tangents: directions of the effects at the fit.
+        misfit: of the fit, if it is at hand.
     """
-    there, near = where_scores_hold(study, fitted)
-    if near is not fitted:
-        tangents = directions(there.model, near.parameters, effects, quick=True)
-    return examine_residual(there, near, tangents), near
+    rough = getattr(study.model, "rough", None)
+    if rough is None or fitted.converged:
+        return misfit or examine_residual(study, fitted, tangents), fitted
+    used, wrong = study.split.fitted, fitted.wrong_numbers
+    near = fit(rough, fitted.parameters, fitted.names, used, wrong_numbers=wrong, title="")
+    tangents = directions(rough, near.parameters, effects, quick=True)
+    return examine_residual(replace(study, model=rough), near, tangents), near
 
 
 def scored(
@@ -111,7 +107,7 @@ def examine(
         misfit: of its residual, or of that of `near`.
         directions: of the effects at `base`.
         threshold: |z| that a fit needs; the critical one of `misfit` if not given.
-        near: the fit whose scores they are (`where_scores_hold`), by default `base`.
+        near: the fit whose scores they are (`scores`), by default `base`.
         beside: effects that `base` has already.
         single: extended BIC of the best single effect, which a pair must not cost.
         after_first: is told, after the first fit, how many there are, and the processor time of this one.

@@ -117,7 +117,7 @@ def explain(study: Study, base: Fit) -> Attribution:
         gain = base.deviance - number.fitted.deviance
         threshold = min(threshold, math.sqrt(max(gain - INDISTINGUISHABLE, 1.0)))
     forecast = _forecast(study, began, tested - began.seconds, _SHARE_OF_TEST * (tested - derived))
-    seen, near = (misfit, base) if base.converged else scores(study, base, study.effects, tangents)
+    seen, near = scores(study, base, study.effects, tangents, misfit)
     candidates = examine(study, base, seen, tangents, threshold=threshold, near=near, after_first=forecast)
     attribution = replace(attribution, candidates=tuple(candidates))
     best = explaining(candidates)

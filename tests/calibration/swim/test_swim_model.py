@@ -28,8 +28,10 @@ from common.errors import InputError
 from planner.planning.plan import Plan
 from sim.knowledge import COEFFICIENTS
 from sim.model.robot import Robot
+from sim.motion.stepped_response import stepped_response
 from tests.oracles.swims import CameraNoise, make_track, swum
 from tests.planner.plans import CONTROL
+from tests.sim.robots import CONTROL_VALUES, control, first_body
 
 THREE = replace(CONTROL, tails=3)
 KICK, CURRENT = (1e-4, 0.003), (2e-5, 0.0)
@@ -80,6 +82,18 @@ def test_poses_are_those_of_the_simulator(robot: Robot, effects: dict[str, float
     at = {**start_values(model), "C_t": truth.C_t, "C_r": truth.C_r, **effects}
     assert (farthest(model, at) < [0.8, 0.8, 0.3]).all()
     assert farthest(model, start_values(model)).max() > 2  # the change is large
+
+
+def test_lags_are_known_while_tails_turn_over() -> None:
+    """Of a fast robot they are far from a straight line."""
+    columns = {name: np.full(2, value) for name, value in {**CONTROL_VALUES, "N": 3.0}.items()}
+    columns["omega_bar"] = np.array([50.0, -50.0])
+    one, time = np.ones(1), np.array([0.06, 0.1, 0.16])
+    (found,) = Vehicles().swimming(columns, np.array([[0, 1]]), one, one, close=False)
+    groups = control(N=3.0, omega_bar=50.0)
+    exact = stepped_response(first_body(groups), groups.N, time, time, history=False).lag
+    assert found.vehicle.lag_after(1, 2.0, time) == pytest.approx(exact, abs=2e-3)
+    assert np.abs(exact - exact[-1] * time[:, None] / time[-1]).max() > 4e-3
 
 
 @pytest.mark.slow
