@@ -32,7 +32,7 @@ from sim.knowledge import COEFFICIENTS, CalibrationKnowledge
 from sim.model.robot import Robot
 from sim.motion.warm import compile_once
 from tests.oracles.drawn_swims import LabSwim, drawn_swim
-from tests.oracles.swim_scores import SwimScores, sized
+from tests.oracles.swim_scores import sized, strengths
 from tests.oracles.swims import CameraNoise, make_track
 
 _NOTHING, _EFFECT = "nothing", "an effect, λ = 8"
@@ -54,13 +54,11 @@ _ASKED = {
 
 def hidden(swim: LabSwim, seed: int) -> tuple[str, Robot]:
     """Choose an effect that one swim can show; return its name and the robot with it."""
-    rng, scores = np.random.default_rng([seed, 1]), SwimScores(swim)
+    rng = np.random.default_rng([seed, 1])
     names = [n for n, i in influences().items() if i.needs is None and n not in (TRACKED_POINT, *_SLOW)]
-    for name in rng.permutation(names).tolist():
-        try:
-            robot = sized(swim.truth, name, int(rng.choice([-1, 1])), scores, _STRENGTH)
-        except InputError:  # the simulation fails
-            continue
+    of = strengths(swim, names)
+    for name in rng.permutation([n for n in names if of[n] > 0]).tolist():
+        robot = sized(swim.truth, name, int(rng.choice([-1, 1])) * _STRENGTH / of[name])
         if robot is not None:
             return name, robot
     raise InputError("no effect shows")

@@ -99,7 +99,7 @@ class SwimModel:
         noise = self.runs.noise_of_poses
         assert noise is not None
         runs, _ = runs_of_swims([of.swim], of.robot.tail_length)
-        inner = SwimmerModel(of.robot, _both_directions(of.robot), self.robot.jobs)
+        inner = SwimmerModel(of.robot, both_directions(of.robot), self.robot.jobs)
         vehicles = Vehicles.of([of.swim], of.robot.time_scale)
         if len(vehicles.before) <= len(self.vehicles.before):
             vehicles = self.vehicles
@@ -142,7 +142,7 @@ def swim_model(robot: Robot, swims: Sequence[MeasuredSwim], *, jobs: int | None 
     runs, held_out = runs_of_swims(swims, robot.tail_length)
     used = ~runs.left_out(held_out)
     vehicles = Vehicles.of(swims, robot.time_scale)
-    model = SwimModel(SwimmerModel(robot, _both_directions(robot), jobs), Sight(runs), runs, vehicles)
+    model = SwimModel(SwimmerModel(robot, both_directions(robot), jobs), Sight(runs), runs, vehicles)
     start = start_values(model)
     (given,) = model.swimming([start])
     runs, seen = with_noise(model.sight, given, used)
@@ -150,7 +150,7 @@ def swim_model(robot: Robot, swims: Sequence[MeasuredSwim], *, jobs: int | None 
     return replace(model, sight=replace(model.sight, runs=runs), runs=runs, began=began), held_out
 
 
-def _both_directions(robot: Robot) -> Measurements:
+def both_directions(robot: Robot) -> Measurements:
     """Make two runs of a robot, one in each direction of its motor."""
     zeros = np.zeros(2)
     return Measurements(
