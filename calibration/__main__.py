@@ -13,12 +13,22 @@ program = Program("calibration", "find from measured runs what the model of a ro
 main = program.main
 
 
-@program.command("decide", of="calibration.api:decide", robot="--robot")
-def _decide(decide: Call, table: str) -> None:
-    refuse_missing(table)
-    from calibration.findings.next_runs import GIVEN_UP
+@program.command("decide", of="calibration.api:decide")
+def _decide(decide: Call, table: str, *, robot: RobotSource | None = None, model: str | None = None) -> None:
+    """Say which of several explanations new runs speak for.
 
-    decision = decide(table=table)
+    Args:
+        robot: robot.toml or the name of a preset; or --model.
+        model: PY, a file with a model of your own.
+    """
+    if bool(robot) == bool(model):
+        raise InputError("give --robot, or --model with a model of your own")
+    refuse_missing(*filter(None, (table, model)))
+    from calibration.findings.next_runs import GIVEN_UP
+    from calibration.own_model.model_file import load_model
+
+    given, measured = load_model(model, table) if model else (robot, table)
+    decision = decide(table=measured, robot=given)
     print(f"{decision.new_runs} new runs. An explanation that is behind by more than {GIVEN_UP:.1f} is given up.")
     for explanation in decision.standings:
         print(f"  {explanation.title}: {f'behind by {explanation.behind:.1f}' if explanation.behind else 'best'}")

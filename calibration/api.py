@@ -5,18 +5,22 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
-from calibration.findings.next_runs import Decision, read_explanations
+from calibration.findings.next_runs import Decision, new_runs, read_explanations
 from calibration.findings.next_runs import decide as decide_between
 from calibration.laws.law_model import with_law
+from calibration.own_model.declared import Model
+from calibration.own_model.table_of_runs import Roles, read_function_model
+from calibration.statistics.traces import whitened
 from calibration.swim.measured_swim import PlanSource, is_track, read_swims
 from calibration.swim.swim_model import swim_model
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.table.reader import open_table
 from calibration.verdict.verdict import Verdict
-from common.errors import naming
+from common.errors import InputError, naming
 from common.keywords import checks_keywords
 from sim.robot_rows import OneRobot, one_robot
 
@@ -25,19 +29,26 @@ from sim.robot_rows import OneRobot, one_robot
 def decide(
     table: str | Path | pd.DataFrame,
     verdict: Verdict | str | Path,
-    robot: OneRobot,
+    robot: OneRobot | Model,
     *,
     plan: PlanSource | None = None,
+    session: str | None = None,
+    specimen: str | None = None,
+    trace: str | None = None,
     jobs: int | None = None,
 ) -> Decision:
     """Say which of several explanations new runs speak for.
 
     Args:
-        table: the measured table with the new runs, in sessions of their own; or the track of a new swim, whose
-            file or `run` has another name than those before.
+        table: the measured table with the new runs, or traces, in sessions of their own; or the track of a new
+            swim, whose file or `run` has another name than those before.
         verdict: an "ambiguous" verdict on the table before, or its verdict.json.
-        robot: the robot as given, its robot.toml, or the name of a preset; of a swim the robot that swam.
+        robot: the robot as given, its robot.toml, or the name of a preset; of a swim the robot that swam. In
+            Python also a `Model` of your own.
         plan: plan.json of the path that was swum, for a track, see `softflagella.calibrate`.
+        session: COL, for a model of your own, as for `softflagella.calibrate`.
+        specimen: COL, as there.
+        trace: COL, as there.
         jobs: threads; default all processors.
 
     Returns:
@@ -55,6 +66,19 @@ def decide(
         explanations, before = list(verdict.explanations), set(verdict.runs.session_names)
     else:
         explanations, before = read_explanations(verdict)
+    roles = Roles(session=session, specimen=specimen, trace=trace)
+    if isinstance(robot, Model):
+        if plan is not None:
+            raise InputError("decide: plan is not for a model of your own; leave it out")
+        model = read_function_model(table, robot, roles)
+        memory = explanations[0].memory
+        if memory is None:
+            return decide_between(model, explanations, before)
+        decision = decide_between(whitened(model, *memory), explanations, before)
+        new = new_runs(model.runs, before)
+        return replace(decision, new_runs=len(np.unique(model.runs.groups("trace")[0][new])))
+    if any(roles):
+        raise InputError("decide: session, specimen and trace are not for a robot; leave them out")
     file = None if isinstance(table, pd.DataFrame) else table
     with naming(table):
         measured = open_table(table)
@@ -62,5 +86,5 @@ def decide(
         swum, _ = swim_model(one_robot(robot), read_swims(measured, plan, file=file), jobs=jobs)
         decision = decide_between(swum, explanations, before)
         return replace(decision, new_runs=sum(swim.name not in before for swim in swum.runs.swims))
-    model = SwimmerModel(one_robot(robot), read_measurements(measured, file=file), jobs)
-    return decide_between(model, explanations, before, with_law)
+    steady = SwimmerModel(one_robot(robot), read_measurements(measured, file=file), jobs)
+    return decide_between(steady, explanations, before, with_law)

@@ -22,7 +22,6 @@ import pandas as pd
 
 from benchmarks.calibration.planted import LinearSwimmer, Signals, linearised, scatter, with_values
 from benchmarks.common import heading, in_parallel, per_cent, row
-from calibration.statistics.residual_tests import TESTABLE
 from calibration.swimmer.measured_table import read_measurements
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict import Verdict
@@ -81,7 +80,7 @@ def main(wanted: str = "20", first: str = "0") -> None:
     truths = [
         (j, LEVEL / float(lengths[j]))
         for j, e in enumerate(model.effects)
-        if survived[j] >= TESTABLE and e.start + LEVEL / lengths[j] <= e.bounds[1]
+        if survived[j] >= model.runs.least_surviving and e.start + LEVEL / lengths[j] <= e.bounds[1]
     ]
     found: list[tuple[str, str]] = []
     tried, seed = 0, int(first)

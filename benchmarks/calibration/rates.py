@@ -40,7 +40,6 @@ from benchmarks.calibration.planted import (
 )
 from benchmarks.calibration.simulated_truth import LENGTHS_CM, THINNING, simulated, sized, thinning
 from benchmarks.common import heading, in_parallel, per_cent, row
-from calibration.statistics.residual_tests import TESTABLE
 from calibration.statistics.statistical_model import Experiment, Parameter
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate
@@ -210,7 +209,7 @@ def linear_cases() -> list[RateCase]:
     for level in (4.0, 8.0):
         for j, effect in enumerate(model.effects):
             size = level / max(float(lengths[j]), 1e-300)
-            if survived[j] >= TESTABLE and effect.start + size <= effect.bounds[1]:
+            if survived[j] >= model.runs.least_surviving and effect.start + size <= effect.bounds[1]:
                 tables, planted = partial(linear_tables, model, model.D[..., j] * size), effect.start + size
                 label = f"one effect, λ = {level:g}"
                 listed.append(RateCase(label, tables, _OF_AN_EFFECT, (effect.name, planted), weight=0.05))
@@ -232,7 +231,11 @@ def simulated_cases(tables: int) -> list[RateCase]:
         size = sized(effect, model, signals)
         return {} if size is None else {effect.name: size}
 
-    testable = [e for e, s in zip(linear.effects, signals.survived(linear.D), strict=True) if s >= TESTABLE]
+    testable = [
+        e
+        for e, s in zip(linear.effects, signals.survived(linear.D), strict=True)
+        if s >= linear.runs.least_surviving
+    ]
     truths = [found for found in map(sizes, testable) if found]
     asked = (*_OF_AN_EFFECT, _UNEXPLAINED, _COVERED)
     return [

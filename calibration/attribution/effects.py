@@ -27,7 +27,7 @@ from calibration.attribution.left_out import session_gain
 from calibration.attribution.rules import INDISTINGUISHABLE, RULES, Stage, Trial, judge
 from calibration.statistics.budget import clock, skipped
 from calibration.statistics.fit import Fit, UnsolvedError, fit
-from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, directions, examine_residual
+from calibration.statistics.residual_tests import Directions, Misfit, directions, examine_residual
 from calibration.statistics.statistical_model import ForwardModel, Parameter, Parameters, start_values
 from calibration.statistics.study import Study
 
@@ -116,7 +116,7 @@ def examine(
     effects = [e for e in study.effects if e not in beside]
     near = near or base
     local = coefficients_within_range(study.model, near.parameters)
-    testable = misfit.scores.survived >= TESTABLE
+    testable = misfit.scores.survived >= study.model.runs.least_surviving
     largest = float(np.max(np.abs(misfit.scores.z), where=testable, initial=0.0))
     trial = Trial(study, base, {}, needed, largest, study.noise_at_most(len(base.names)), single)
     candidates = scored(misfit, near, effects, needed, beside)

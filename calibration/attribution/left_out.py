@@ -1,6 +1,6 @@
 """What left-out runs say: each is predicted from the other sessions, by one linear step, and gains are paired.
 
-Numbers that left-out runs have of their own are fitted to these runs, since no others know them.
+Numbers that left-out runs have of their own are fitted to these runs, since others know them hardly or not at all.
 
 Two gains share the runs without either model, so their own standard errors say nothing about which one is larger.
 So two models are compared by the difference of the log likelihoods, paired over conditions: with C conditions of
@@ -28,6 +28,7 @@ from calibration.statistics.study import Study, leave_one_group_out
 from common.arrays import Flags, Floats, Integers
 
 _QUANTILE = 0.975
+_LITTLE = 0.1  # sum of squared derivatives, over that of the left-out runs
 
 
 class PairedGain(NamedTuple):
@@ -98,10 +99,10 @@ def left_out_residual(study: Study, fitted: Fit, noise: Noise) -> Floats:
 def _without_own_numbers(
     fitted: Fit, white: Floats, learn: Flags, out: Flags, whiten: Callable[[Floats], Floats]
 ) -> Floats:
-    """Take from a white residual of the runs `out` what numbers change of which other runs say nothing."""
-    own = [
-        place for place, p in enumerate(fitted.fitted) if p.of_group and not fitted.tangents[learn, :, place].any()
-    ]
+    """Take from a white residual of the runs `out` what numbers of a group change of which others say little."""
+    others, these = ((fitted.tangents[rows] ** 2).sum((0, 1)) for rows in (learn, out))
+    hardly = (others <= _LITTLE * these) & (these > 0)
+    own = [place for place in np.flatnonzero(hardly).tolist() if fitted.fitted[place].of_group]
     if not own:
         return white
     basis = np.linalg.qr(whiten(fitted.tangents[out][..., own]))[0]

@@ -31,7 +31,7 @@ from calibration.attribution.hypothesis import Evidence, Hypothesis, Origin
 from calibration.attribution.rules import CERTAIN, INDISTINGUISHABLE, RULES, Trial, judge, shift_of
 from calibration.statistics.budget import skipped
 from calibration.statistics.fit import Fit, UnsolvedError, birge, fit
-from calibration.statistics.residual_tests import TESTABLE, Directions, examine_residual
+from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.shifted import Shift, Shifted
 from calibration.statistics.statistical_model import Experiment, Parameter
 from calibration.statistics.study import Study
@@ -140,7 +140,7 @@ def _clearest(
     columns = [base.jacobian[..., base.names.index(n.name)] * rows[:, None] for n, _, rows in pairs]
     tested = replace(study, seed=study.seed + 6, level=study.level * _SHARE_OF_LEVEL)
     misfit = examine_residual(tested, base, Directions.plain(np.stack(columns, -1)), draws=_DRAWS)
-    z = np.where(misfit.scores.survived >= TESTABLE, misfit.scores.z, 0.0)
+    z = np.where(misfit.scores.survived >= study.model.runs.least_surviving, misfit.scores.z, 0.0)
     largest = float(np.abs(z).max())
     if largest < max(misfit.critical_z, CERTAIN):
         return []

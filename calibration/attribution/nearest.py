@@ -46,7 +46,7 @@ from calibration.linear.gls import schur_complement, solve_normal
 from calibration.statistics.budget import skipped, spent
 from calibration.statistics.fit import Fit, UnsolvedError, birge, fit, profile_end
 from calibration.statistics.forward import derivatives
-from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, examine_residual
+from calibration.statistics.residual_tests import Directions, Misfit, examine_residual
 from calibration.statistics.shifted import Shift, Shifted
 from calibration.statistics.statistical_model import (
     Experiment,
@@ -112,7 +112,7 @@ def adopt_nearest(
     adopted: list[Hypothesis] = []
     tried = {c.effect.name: c for c in candidates}
     noise_known = study.model.runs.noise_known
-    for candidate in _promising(base, misfit.critical_z if noise_known else 0.0, candidates):
+    for candidate in _promising(study, base, misfit.critical_z if noise_known else 0.0, candidates):
         if skipped(f"{candidate.title} as the nearest form"):
             continue
         try:
@@ -175,9 +175,10 @@ def _birge(study: Study, fitted: Fit) -> float:
     return birge(study.model.runs, fitted, study.split.fitted)
 
 
-def _promising(base: Fit, least: float, candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
+def _promising(study: Study, base: Fit, least: float, candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Choose effects with |z| above `least` that remove most by their fits, or by their scores without one."""
-    tested = [c for c in candidates if abs(c.score) > least and (c.evidence.survived or 0.0) >= TESTABLE]
+    shown = study.model.runs.least_surviving
+    tested = [c for c in candidates if abs(c.score) > least and (c.evidence.survived or 0.0) >= shown]
     return sorted(tested, key=lambda c: c.fit.deviance if c.fit else base.deviance - c.score**2)[:FIRST]
 
 

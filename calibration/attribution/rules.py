@@ -19,7 +19,6 @@ import numpy as np
 
 from calibration.attribution.hypothesis import Hypothesis, Origin, Reason, SetErrors
 from calibration.statistics.fit import Fit
-from calibration.statistics.residual_tests import TESTABLE
 from calibration.statistics.shifted import Shift, Shifted
 from calibration.statistics.study import Study
 
@@ -201,8 +200,9 @@ _FITTED = (*_EFFECTS, *_FORMS, Origin.MOVE)
 RULES = (
     Rule(Stage.SCORE, _EFFECTS, Reason.NO_CHANGE, "no size changes the runs",
          lambda h, _: (h.evidence.detectable or 0.0) > UNSEEN),
-    Rule(Stage.SCORE, _EFFECTS, Reason.ABSORBED, f"less than {TESTABLE:.0%} of its signal survives the projection",
-         lambda h, _: (h.evidence.survived or 0.0) < TESTABLE),
+    Rule(Stage.SCORE, _EFFECTS, Reason.ABSORBED,
+         "less than 3 % of its signal (of poses 1 %) survives the projection",
+         lambda h, trial: (h.evidence.survived or 0.0) < trial.study.model.runs.least_surviving),
     Rule(Stage.SCORE, _EFFECTS, Reason.NOISE, "|z| is below the critical one",
          lambda h, trial: abs(h.score) < trial.needed),
     Rule(Stage.SCORE, _EFFECTS, Reason.WRONG_SIGN,

@@ -11,11 +11,11 @@ because B can be fitted again (T-optimal design, linearised). There is a λ for 
 single runs the smallest counts. How often the runs decide is found by drawing them at random. Source: Atkinson
 and Fedorov (1975).
 
-A swim is many rows, and has own numbers, such as its start, that are fitted to it alone. They are in J as well; in
-Cov they have a wide prior, or that of their tolerance.
+A swim or a trace is many rows, and has own numbers, such as its start, that are fitted to it alone. They are in J
+as well; in Cov they have a wide prior, or that of their tolerance.
 
-A batch is chosen one run after the other; of swims it is the best one. With equal odds the wrong one of two is
-chosen with the probability Φ(−√λ/2); the run is taken that makes the sum of these over all pairs least.
+A batch is chosen one run after the other; of swims and traces it is the best one. With equal odds the wrong one of
+two is chosen with the probability Φ(−√λ/2); the run is taken that makes the sum of these over all pairs least.
 
 Each explanation was fitted before the new runs were made, and gives them a density: Gaussian about its prediction,
 with covariance Σ + J Cov Jᵀ, J Cov Jᵀ the error of its own fit. The ratio of two densities, of all new runs
@@ -41,7 +41,7 @@ from calibration.attribution.hypothesis import Hypothesis
 from calibration.linear.gls import Noise
 from calibration.statistics.forward import derivatives
 from calibration.statistics.statistical_model import Experiment, ForwardModel, apply_step, parameter, start_values
-from calibration.table.runs import Runs
+from calibration.table.runs import Runs, lines_of_excluded
 from common.arrays import Flags, Floats
 from common.errors import InputError
 from common.reading import expecting, read_json
@@ -53,7 +53,7 @@ BATCH = 8  # runs
 SELDOM = 0.5  # share of cases in which runs must decide to be worth making
 _DRAWS = 4000
 _DECIDES = 3.84  # difference of χ² at which one of the two is chosen
-_PROPOSED = 3  # single settings
+_PROPOSED, _PROPOSED_WHOLE = 3, 15  # single settings; swims or traces
 _WANTED = 0.9  # share of draws that should decide
 _ENOUGH = 13.1  # λ at which they do
 _MOST_REPEATS = 16
@@ -118,9 +118,8 @@ class Pair(NamedTuple):
 def next_runs(rivals: Sequence[Hypothesis], *, seed: int = 0) -> tuple[tuple[NextRun, ...], Batch]:
     """Find the best experiments to tell (the first four) rivals apart, best first, and the best `BATCH` runs.
 
-    Of experiments of several rows, such as swims, all are listed, the cheapest first of those that decide in
-    `_WANTED` of cases. None is repeated, and the batch is the best one. The numbers of its own take the place of
-    what a session shifts.
+    Of experiments of several rows, swims or traces, more are listed, the cheapest first of those that decide in
+    `_WANTED` of cases. None is repeated, and the batch is the best one.
 
     Raises:
         InputError: a run cannot be simulated; of swims none can.
@@ -145,21 +144,22 @@ def next_runs(rivals: Sequence[Hypothesis], *, seed: int = 0) -> tuple[tuple[Nex
     settings, rows = [settings[place] for place in kept], [experiments[place].tolist() for place in kept]
     whole = max(map(len, rows)) > 1
     ratio = np.mean([np.asarray(f.noise.session_ratio) for f in fits], 0)
-    noise = Noise(np.mean([f.noise.run_covariance for f in fits], 0), 0.0 if whole else ratio)
-    alone = np.array([_together(pairs, noise, of).min() for of in rows])
+    noise = Noise(np.mean([f.noise.run_covariance for f in fits], 0), ratio)
+    along = first.runs.along
+    alone = np.array([_together(pairs, noise, along, of).min() for of in rows])
     runs = []
     rng = np.random.default_rng(seed)
     order = np.argsort(-np.minimum(alone, _ENOUGH if whole else math.inf), kind="stable")
-    for place in order[: None if whole else _PROPOSED].tolist():
+    for place in order[: _PROPOSED_WHOLE if whole else _PROPOSED].tolist():
         for repeats in (1,) if whole else (1, 2, 4, 8, _MOST_REPEATS):
-            strength = float(_together(pairs, noise, rows[place] * repeats).min())
+            strength = float(_together(pairs, noise, along, rows[place] * repeats).min())
             decides = _decides(strength, rng)
             if decides >= _WANTED:
                 break
         runs.append(NextRun(settings[place], repeats, strength, decides))
     if whole:
         return tuple(runs), Batch((runs[0].settings,), runs[0].separation, runs[0].decides)
-    chosen, strength = _greedy(pairs, noise)
+    chosen, strength = _greedy(pairs, noise, along)
     batch = tuple(settings[place] for place in chosen)
     return tuple(runs), Batch(batch, strength, _decides(strength, rng))
 
@@ -170,18 +170,18 @@ def _decides(strength: float, rng: np.random.Generator) -> float:
     return float((draws > _DECIDES).mean())
 
 
-def _greedy(pairs: Sequence[Pair], noise: Noise) -> tuple[list[int], float]:
+def _greedy(pairs: Sequence[Pair], noise: Noise, along: Floats) -> tuple[list[int], float]:
     """Choose `BATCH` runs, one after the other; return their places and the smallest λ of them together."""
     chosen: list[int] = []
     for _ in range(BATCH):
-        tried = [_together(pairs, noise, [*chosen, place]) for place in range(len(pairs[0].difference))]
+        tried = [_together(pairs, noise, along, [*chosen, place]) for place in range(len(pairs[0].difference))]
         chosen.append(int(np.argmin([ndtr(-np.sqrt(strength) / 2).sum() for strength in tried])))
     return sorted(chosen), float(tried[chosen[-1]].min())
 
 
-def _together(pairs: Sequence[Pair], noise: Noise, places: list[int]) -> Floats:
-    """Compute λ of several rows made together, for every pair."""
-    white = noise.whitener(np.zeros(len(places), dtype=np.int64))  # one session
+def _together(pairs: Sequence[Pair], noise: Noise, along: Floats, places: list[int]) -> Floats:
+    """Compute λ of several rows made together, for every pair; for `along` (m,) see `Runs`."""
+    white = noise.whitener(np.zeros(len(places), dtype=np.int64), along=along[places])  # one session
     tables = (np.concatenate([pair.difference[..., None], pair.J], -1)[places] for pair in pairs)
     whitened = (white(table) for table in tables)
     return np.array([
@@ -227,8 +227,12 @@ def _root(covariance: Floats) -> Floats:
 
 
 def _with_own(model: ForwardModel, before: Explanation) -> tuple[list[str], Floats]:
-    """List what new runs fit again, and its covariance: that of an explanation, and wide of their own numbers."""
-    own = [p for p in (*model.coefficients, *model.nuisances) if p.of_these_runs]
+    """List what new runs fit again, and its covariance: that of an explanation, and wide of their own numbers.
+
+    Their own are those of these runs, and of specimens that are new.
+    """
+    every = [p for p in (*model.coefficients, *model.nuisances) if p.of_these_runs or p.of_group]
+    own = [p for p in every if p.name not in before.parameters]
     widths = [p.sigma or _WIDE * (1.0 if p.logarithmic else abs(p.typical)) for p in own]
     names = [*before.parameters, *(p.name for p in own)]
     return names, block_diag(before.covariance, np.diag(np.square(widths)))
@@ -244,6 +248,7 @@ class Explanation:
     noise: Noise  # of runs and sessions
     outputs: tuple[str, ...]  # (k,) that were fitted
     law: Mapping[str, Any] = field(default_factory=dict)  # of a rival that is a law, see `with_law`
+    memory: tuple[float, float] | None = None  # s and τ of the noise along traces, see `Memory`
 
     @staticmethod
     def of(rival: Hypothesis) -> Explanation:
@@ -251,8 +256,11 @@ class Explanation:
         fitted = rival.fitted
         kept = [place for place, p in enumerate(fitted.fitted) if not p.of_these_runs]
         parameters = {fitted.names[place]: fitted.parameters[fitted.names[place]] for place in kept}
-        covariance, outputs = fitted.covariance[np.ix_(kept, kept)], tuple(rival.model.runs.outputs)
-        return Explanation(rival.title, parameters, covariance, fitted.noise, outputs, rival.law)
+        covariance, runs = fitted.covariance[np.ix_(kept, kept)], rival.model.runs
+        memory = None if runs.memory is None else (runs.memory.share, runs.memory.tau)
+        return Explanation(
+            rival.title, parameters, covariance, fitted.noise, tuple(runs.outputs), rival.law, memory
+        )
 
     def record(self) -> dict[str, Any]:
         """Write it for verdict.json."""
@@ -264,6 +272,7 @@ class Explanation:
             "share_of_sessions": np.broadcast_to(self.noise.session_ratio, len(self.outputs)).tolist(),
             "outputs": list(self.outputs),
             **({"law": dict(self.law)} if self.law else {}),
+            **({"memory": list(self.memory)} if self.memory else {}),
         }
 
     @staticmethod
@@ -283,8 +292,13 @@ class Explanation:
             raise ValueError
         if not np.isfinite(numbers).all():
             raise ValueError
-        law = dict(record.get("law", {}))
-        return Explanation(str(record["title"]), parameters, covariance, Noise(run, share), outputs, law)
+        law, memory = dict(record.get("law", {})), None
+        if "memory" in record:
+            slow, tau = map(float, record["memory"])
+            if not (0 <= slow <= 1 and 0 < tau < math.inf):
+                raise ValueError
+            memory = slow, tau
+        return Explanation(str(record["title"]), parameters, covariance, Noise(run, share), outputs, law, memory)
 
 
 @dataclass(frozen=True)
@@ -318,9 +332,10 @@ def new_runs(runs: Runs, before: set[str]) -> Flags:
     """Choose the runs (n,) of sessions that were not there before; refuse a table without such."""
     new = np.array([runs.session_names[s] not in before for s in runs.session])
     if not new.any():
+        set_aside = "".join(f"; {line}" for line in lines_of_excluded(runs)[:1])
         raise InputError(
             "all sessions of this table were there before; give the new runs a session of their own "
-            "(column session), a new swim a name of its own (column run, or its file)"
+            f"(column session), a new swim a name of its own (column run, or its file){set_aside}"
         )
     return new
 
@@ -380,7 +395,7 @@ class Decision:
     """
 
     standings: tuple[Standing, ...]  # best first
-    new_runs: int  # how many there were; of tracks how many swims
+    new_runs: int  # how many there were, or how many swims or traces
 
     @property
     def decided(self) -> str | None:

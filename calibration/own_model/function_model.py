@@ -18,6 +18,7 @@ import pandas as pd
 from tqdm import tqdm
 
 from calibration.own_model.declared import Model
+from calibration.own_model.possible_traces import possible_traces
 from calibration.statistics.budget import count_predictions, spent, waiting
 from calibration.statistics.forward import by_differences, linear, secants
 from calibration.statistics.statistical_model import Parameter, Parameters, Predict
@@ -27,6 +28,7 @@ from common.arrays import Flags, Floats, Integers
 from common.errors import InputError
 
 _KEPT = 16  # predictions
+_NEXT = "next"  # session that can be made
 NOT_ABOVE_0 = np.log(1e-300)  # stands for the logarithm of what is not above 0
 
 
@@ -251,6 +253,8 @@ class FunctionModel:
 
     def possible(self) -> tuple[FunctionModel, list[dict[str, Any]]]:
         """Return a run for each of the table's conditions, with what the lab can set, named by its columns."""
+        if self.runs.trace is not None:
+            return self._possible_traces()
         first = np.unique(self.runs.condition, return_index=True)[1]
         table = pd.DataFrame({name: values[first] for name, values in self.columns.items()}).assign(row=first)
         for name, own in self.own.items():
@@ -258,10 +262,31 @@ class FunctionModel:
         table = table.drop_duplicates(names := [name.removeprefix("ln ") for name in self.runs.input_names])
         runs = replace(self.runs.subset(table.pop("row").to_numpy()), condition=np.arange(len(table)))
         if not any(number.per == "session" for number in self.model.numbers):
-            runs = replace(runs, session=np.zeros(len(runs), dtype=np.int64), session_names=("next",))
+            runs = replace(runs, session=np.zeros(len(runs), dtype=np.int64), session_names=(_NEXT,))
         values = {name: table[name].to_numpy().astype(old.dtype) for name, old in self.columns.items()}
         settings = [{name: values[name][row].item() for name in names} for row in range(len(runs))]
         return replace(self, runs=runs, columns=AskedColumns(values, self.columns.asked), known={}), settings
+
+    def _possible_traces(self) -> tuple[FunctionModel, list[dict[str, Any]]]:
+        """Return traces that can be made next (`calibration.own_model.possible_traces`), in one session."""
+        names = [name.removeprefix("ln ") for name in self.runs.input_names[:-1]]
+        known, longer = {name: self.columns[name] for name in names}, not self.turns.any()
+        traces = possible_traces(self.runs, known, self.own, longer=longer)
+        each, own = [len(trace.rows) for trace in traces], {str(self.model.time): [trace.time for trace in traces]}
+        for name in self.own:
+            own[name] = [np.full(len(trace.rows), trace.own[name]) for trace in traces]
+        rows, changed = np.concatenate([trace.rows for trace in traces]), {}
+        for name, column in self.columns.items():
+            values = np.concatenate(own[name]) if name in own else column[rows]
+            changed[name] = np.asarray(values).astype(column.dtype)
+        number = np.repeat(np.arange(len(traces)), each)
+        runs = replace(
+            self.runs.subset(rows), condition=number, trace=number, time=changed[str(self.model.time)],
+            trace_names=tuple(f"{_NEXT} {place}" for place in range(len(traces))), completion=None,
+            session=np.zeros(len(rows), dtype=np.int64), session_names=(_NEXT,),
+        )  # fmt: skip
+        model = replace(self, runs=runs, columns=AskedColumns(changed, self.columns.asked), known={})
+        return model, [trace.settings for trace in traces]
 
 
 def evaluate(model: Model, columns: AskedColumns, parameters: Mapping[str, Any]) -> Floats:

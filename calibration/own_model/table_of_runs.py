@@ -57,15 +57,10 @@ class Roles(NamedTuple):
     trace: str | None = None
 
 
-def read_runs_of(
-    source: str | Path | pd.DataFrame,
-    model: Model,
-    roles: Roles,
-    *,
-    own: Mapping[str, Sequence[float]] | None = None,
-    title: str = "",
-) -> tuple[FunctionModel, Flags | None]:
-    """Read the runs of a model from a file or a table, check both, and say which are held out, (n,).
+def read_function_model(
+    source: str | Path | pd.DataFrame, model: Model, roles: Roles, *, title: str = ""
+) -> FunctionModel:
+    """Read the runs of a model from a file or a table, and check both.
 
     Raises:
         InputError: the table lacks a column, or the model or what was measured has a fault.
@@ -80,19 +75,36 @@ def read_runs_of(
                 f'trace {roles.trace} needs a model with a column of the time: sf.Model(…, time="t_s")'
             )
         result = _read(table, model, roles._replace(session=session))
+        caveats = check_function(result, title=title)
+        return replace(result, runs=replace(result.runs, caveats=(*caveats, *_advice(result, roles))))
+
+
+def read_runs_of(
+    source: str | Path | pd.DataFrame,
+    model: Model,
+    roles: Roles,
+    *,
+    own: Mapping[str, Sequence[float]] | None = None,
+    title: str = "",
+) -> tuple[FunctionModel, Flags | None]:
+    """Read the runs of a model as `read_function_model` does, and say which are held out, (n,).
+
+    Raises:
+        InputError: as there; or none can be held out.
+    """
+    result = read_function_model(source, model, roles, title=title)
+    with naming(source):
         if len(result.runs.trace_names) == 1:
             raise InputError("the table has one trace only, so none can be held out; give several, best repeats")
-        caveats = check_function(result, title=title)
         held_out = _held_out(roles.held_out, result)
         if held_out is None and not middle_session(result.runs).any():
             raise InputError(
                 "all rows have one setting and one session, so none can be held out; give more of them"
             )
-        advice = _advice(result, roles)
         settings = [name for name in result.runs.settings if name not in result.runs.words]
         if own and (unknown := [name for name in own if name not in settings]):
             raise InputError(f"own: {unknown[0]!r} is no setting of this table; there are {', '.join(settings)}")
-        return replace(result, own=own or {}, runs=replace(result.runs, caveats=(*caveats, *advice))), held_out
+        return replace(result, own=own or {}), held_out
 
 
 def _in_its_units(table: pd.DataFrame, model: Model) -> tuple[pd.DataFrame, tuple[str, ...]]:

@@ -56,7 +56,6 @@ from calibration.statistics.study import Study
 from calibration.table.runs import Runs, features
 from common.arrays import Flags, Floats, Integers
 
-TESTABLE = 0.03  # an effect cannot be tested if less than this share of its signal survives the projection
 GENERAL = ("lack", "kernel", "shape", "pull")
 _PASSES = 3  # iterations for the scatter of the sessions
 _PASSES_OF_A_SCORE = 2
@@ -164,7 +163,7 @@ class _Tester:
         self.absorbed = _Absorbed(data, used, fitted)
         kept = self.absorbed.kept
         numbers = [fitted.fitted[place] for place in kept]
-        self.p = len(kept)
+        self.p, self.least_surviving = len(kept), data.least_surviving
         self.pulled = np.array([p.sigma is not None and not p.grid for p in numbers], dtype=bool)
         columns = np.concatenate([fitted.tangents[..., kept], D], -1)
         self.design = self.absorbed.regression(columns, numbers, data.repeats(used))
@@ -225,7 +224,7 @@ class _Tester:
         square = (root**2).sum(1)[:, :, None] * (self.F**2).sum(0)
         square += np.einsum("bsaa,sf->baf", of_means, self.F_means**2, optimize=True)
         projected = square - np.einsum("bafp,bpq,bafq->baf", absorbed, covariance, absorbed, optimize=True)
-        seen = projected > TESTABLE**2 * square
+        seen = projected > self.least_surviving**2 * square
         z = np.where(seen, score / np.sqrt(np.where(seen, projected, 1.0)), 0.0)
         return np.asarray(z).reshape(count, k, -1)
 
@@ -378,7 +377,7 @@ def examine_residual(
     exact = tester.absorbed.regression(columns, (), tester.design.repeated).products(
         tester.absorbed.project(residual)
     )
-    testable = observed.survived[0] >= TESTABLE
+    testable = observed.survived[0] >= data.least_surviving
     rng = np.random.default_rng(study.seed)
     run_covariance = tester.design.noise(residual)
     statistics = np.append(observed.general[0], _largest(observed.z, testable))

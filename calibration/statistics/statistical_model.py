@@ -156,6 +156,12 @@ class Wrapped:
     def untestable(self) -> Mapping[str, str]:
         return self.inner.untestable
 
+    @property
+    def rough(self) -> Wrapped | None:
+        """The same model around the rough one of the model within, if there is one."""
+        rough = getattr(self.inner, "rough", None)
+        return None if rough is None else replace(self, inner=rough)
+
     def check(self, prediction: Floats) -> None:
         """Refuse measurements as the model within does."""
         self.inner.check(prediction)

@@ -30,6 +30,7 @@ from calibration.linear.memory import Memory, Repeats, estimate_memory
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.forward import derivatives
 from calibration.statistics.statistical_model import (
+    Experiment,
     Parameter,
     Parameters,
     Predict,
@@ -48,7 +49,7 @@ _ABSORBED = 1 / 3  # most columns of a trace without repeats, over its readings
 
 @dataclass(frozen=True)
 class Whitened(Wrapped):
-    """A model of readings of traces, white along these. It proposes no next runs: a reading is not made alone."""
+    """A model of readings of traces, white along these."""
 
     memory: Memory
 
@@ -76,8 +77,21 @@ class Whitened(Wrapped):
         predict = self.inner.linearised(at, along, title=title, quick=quick)
         return lambda sets: self._white_sets(predict(sets))
 
+    def possible(self) -> tuple[Whitened, list[dict[str, Any]]]:
+        """Return traces that can be made next, in the same noise."""
+        model, settings = self.inner.possible()
+        return whitened(model, self.memory.share, self.memory.tau), settings  # type: ignore[arg-type]
+
     def _white_sets(self, predictions: Floats) -> Floats:
         return np.moveaxis(self.memory.whiten(np.moveaxis(predictions, 0, -1)), -1, 0)
+
+
+def whitened(model: Experiment, share: float, tau: float) -> Whitened:
+    """Make a model of readings of traces white in noise with a memory, see `Memory`."""
+    runs = model.runs
+    assert runs.trace is not None
+    assert runs.time is not None
+    return Whitened(model, Memory(runs.trace, runs.time, share, tau))
 
 
 def whiten_traces(study: Study, start: dict[str, float]) -> tuple[Study, dict[str, float]]:
@@ -97,12 +111,9 @@ def whiten_traces(study: Study, start: dict[str, float]) -> tuple[Study, dict[st
     residual, repeats = _without_sessions(runs, runs.y - first.prediction), list(_repeats(first, runs))
     known = bool(repeats) and runs.noise_known
     noise = estimate_memory(repeats or list(_of_each_trace(study, first, used)), residual)
-    assert runs.trace is not None
-    assert runs.time is not None
-    memory = Memory(runs.trace, runs.time, noise.share, noise.tau)
     changes = {"noise_of_traces": noise, "noise_known": known, "sigma": None}
     inner: Any = with_runs(plain, **changes, states=_states(runs, first.prediction))
-    return replace(study, model=Whitened(inner, memory)), first.parameters
+    return replace(study, model=whitened(inner, noise.share, noise.tau)), first.parameters
 
 
 def _repeats(first: Fit, runs: Runs) -> Iterator[Repeats]:

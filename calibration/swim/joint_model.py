@@ -54,6 +54,12 @@ class JointModel:
         every = {**self.swim.untestable, **self.table.untestable}
         return {title: why for title, why in every.items() if title not in tested}
 
+    @property
+    def rough(self) -> JointModel | None:
+        """The same model with a rough one of the swims, if there is one."""
+        rough = self.swim.rough
+        return None if rough is None else replace(self, swim=rough, runs=self.runs.with_swims(rough.runs))
+
     @cached_property
     def _of_swims(self) -> dict[str, str]:
         """Names that numbers of the swims have beside others of the table, by those within the model of swims."""

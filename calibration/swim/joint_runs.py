@@ -69,6 +69,10 @@ class JointRuns(Runs):
         return _numbered(self.swum.resampled, self.table.resampled)
 
     @property
+    def least_surviving(self) -> float:
+        return self.swum.least_surviving
+
+    @property
     def stretches(self) -> str:
         return f"{self.swum.stretches} and {self.table.stretches}"
 
@@ -124,6 +128,10 @@ class JointRuns(Runs):
 
     def white_features(self, table: Floats) -> Floats:
         return table
+
+    def with_swims(self, swum: SwimRuns) -> JointRuns:
+        """Return the same rows with poses that are white in another noise."""
+        return replace(self, swum=swum, y=self._poses_replaced(self.y, lambda _: swum.y))
 
     def _poses_replaced(self, table: Floats, change: Any) -> Floats:
         changed, poses = table.copy(), (slice(len(self.swum)), slice(len(self.swum.outputs)))

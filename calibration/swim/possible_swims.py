@@ -96,6 +96,15 @@ def _path_length(swim: MeasuredSwim) -> float:
     return float(np.hypot(*np.diff(places, axis=0).T).sum())
 
 
+class _Poses(Runs):
+    """Poses that are not known yet."""
+
+    @property
+    def along(self) -> Floats:
+        """Zero: a shift of all poses is that of the start."""
+        return np.zeros(len(self))
+
+
 @dataclass(frozen=True)
 class PossibleSwims:
     """Predicts swims that can be made next, one after the other; each is a condition."""
@@ -116,10 +125,10 @@ class PossibleSwims:
 
     @cached_property
     def runs(self) -> Runs:
-        """Poses that are not known yet."""
+        """The poses of all swims."""
         swim = np.repeat(np.arange(len(self.models)), [len(model.runs) for model in self.models])
         first, count = self.models[0].runs, len(swim)
-        return Runs(
+        return _Poses(
             outputs=first.outputs, y=np.zeros((count, len(first.outputs))), condition=swim,
             session=np.zeros(count, dtype=np.int64), session_names=(_NEXT,), inputs=np.empty((count, 0)),
             input_names=(), rows=np.arange(count), excluded=(), caveats=(),

@@ -66,6 +66,11 @@ class SwimRuns(Runs):
         return "pose"
 
     @property
+    def least_surviving(self) -> float:
+        """Of a path that bends another way, start and coefficients take nearly all."""
+        return 0.01
+
+    @property
     def stretches(self) -> str:
         return "stretches"
 

@@ -265,6 +265,11 @@ class Runs:
         return np.column_stack([_levels(mirrored[rows]), _levels(self.session[rows]), odd])
 
     @property
+    def least_surviving(self) -> float:
+        """The share of an effect's signal that fitted numbers must leave for a test of the effect."""
+        return 0.03
+
+    @property
     def stretches(self) -> str:
         """What is left out together, in a word."""
         return "conditions"

@@ -282,7 +282,7 @@ def _handed_on(study: Study, attribution: Attribution, errors: HeldOutErrors) ->
 def _next_runs(rivals: tuple[Hypothesis, ...], seed: int) -> dict[str, Any]:
     """Plan the runs that would tell rivals apart; none without rivals, or if one breaks down at such runs."""
     with suppress(InputError):
-        if rivals and rivals[0].model.runs.trace is None and not skipped("next runs"):
+        if rivals and not skipped("next runs"):
             return dict(zip(("next_runs", "next_batch"), next_runs(rivals, seed=seed), strict=True))
     return {"next_runs": (), "next_batch": None}
 

@@ -16,7 +16,7 @@ from calibration.linear.gls import (
     schur_complement,
     solve_normal,
 )
-from calibration.statistics.residual_tests import TESTABLE, Directions, directions, examine_residual, kernel_factor
+from calibration.statistics.residual_tests import Directions, directions, examine_residual, kernel_factor
 from calibration.statistics.statistical_model import precisions, prior_offsets
 from calibration.statistics.study import Study, middle_session
 from calibration.table.runs import features
@@ -178,6 +178,6 @@ def test_lengths_are_those_of_a_dense_covariance() -> None:
     white = np.linalg.inv(np.linalg.cholesky(covariance))
     free, seen = white @ flat[:, ~np.array(bound)], white @ tangents.table[..., chosen].reshape(len(flat), -1)
     lengths = np.linalg.norm(seen - free @ np.linalg.lstsq(free, seen, rcond=None)[0], axis=0)
-    shown = np.asarray(misfit.scores.survived) > TESTABLE
+    shown = np.asarray(misfit.scores.survived) > model.runs.least_surviving
     assert shown.sum() > 5
     assert misfit.scores.length[shown] == pytest.approx(lengths[shown], rel=1e-4)

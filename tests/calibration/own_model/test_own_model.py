@@ -152,7 +152,7 @@ def test_the_next_runs_are_named_by_the_columns_of_the_table() -> None:
 
 
 def test_what_the_lab_can_set_may_tell_explanations_apart() -> None:
-    """Within the table's diameters the two do not differ, far beyond them they do."""
+    """Within the table's diameters the two do not differ, far beyond them they do; new runs there decide."""
     steeper = sf.Effect("steeper", "steeper", low=-1, high=4)
     model = replace(
         MODEL,
@@ -165,6 +165,18 @@ def test_what_the_lab_can_set_may_tell_explanations_apart() -> None:
     assert result.verdict == wider.verdict == "ambiguous"
     assert wider.next_batch.decides > result.next_batch.decides
     assert {run["d"] for run in wider.next_batch.settings} <= {0.05, 0.5, 2.0}
+    d, noise = np.array([run["d"] for run in wider.next_batch.settings]), np.random.default_rng(0)
+    numbers = {"v1": 300.0, "wall": 0.0, "steeper": 0.0}
+    for effect in ("wall", "steeper"):
+        at = {**numbers, effect: 1.0}
+        new = pd.DataFrame({"round": 9, "d": d, "v": model.function({"d": d}, at)["v"]})
+        new["v"] *= np.exp(0.01 * noise.normal(size=len(d)))
+        for table in (new, pd.concat([TABLE, new], ignore_index=True)):
+            decision = sf.decide(table, wider, model, session="round")
+            assert decision.decided == next(e.title for e in model.effects if e.name == effect)
+            assert decision.new_runs == len(d)
+    with pytest.raises(InputError, match=r"were there before.*; excluded: .*round is not a finite number"):
+        sf.decide(pd.concat([TABLE, new.assign(round="new")]), wider, model, session="round")
     with pytest.raises(InputError, match="'b' is no setting of this table; there are d"):
         sf.calibrate(TABLE, model, session="round", progress=False, own={"b": (1.0,)})
 

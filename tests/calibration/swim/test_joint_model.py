@@ -16,6 +16,7 @@ from calibration.linear.gls import Regression
 from calibration.robot.robot_verdict import RobotVerdict
 from calibration.statistics.fit import fit, variance_factor
 from calibration.statistics.forward import derivatives
+from calibration.statistics.offsets import Offsets
 from calibration.statistics.statistical_model import Experiment, parameter, regression, start_values
 from calibration.statistics.study import groups, middle_session
 from calibration.swim.joint_model import JointModel, joint_model
@@ -89,6 +90,25 @@ def test_rows_of_either_kind_are_as_they_are_alone() -> None:
     table_of_noise = np.random.default_rng(0).normal(size=(*runs.y.shape, 2))
     np.testing.assert_allclose(runs.whitened(runs.raw(table_of_noise)), table_of_noise, atol=1e-9)
     np.testing.assert_array_equal(runs.raw(table_of_noise)[count:], table_of_noise[count:])
+
+
+@pytest.mark.slow
+def test_the_rough_model_is_that_of_the_swims_beside_the_table() -> None:
+    """Also within a model that is around it."""
+    (swim, _), (table, _), (joint, _) = models(BIAS)
+    count, k = len(swim.runs), len(swim.runs.outputs)
+    assert swim.rough is not None
+    for rough in (joint.rough, Offsets(joint, {}).rough):
+        assert rough is not None
+        start = start_values(joint)
+        for given, of_swims, of_table in (
+            (rough.runs.y, swim.rough.runs.y, table.runs.y),
+            (rough.predict([start])[0], swim.rough.predict([start])[0], table.predict([start])[0]),
+        ):
+            np.testing.assert_array_equal(given[:count, :k], of_swims)
+            np.testing.assert_array_equal(given[count:, k:], of_table)
+        np.testing.assert_allclose(rough.runs.raw(rough.runs.y), joint.runs.raw(joint.runs.y), atol=1e-9)
+    assert replace(joint, swim=swim.rough).rough is None
 
 
 @pytest.mark.slow

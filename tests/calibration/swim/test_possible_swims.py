@@ -101,7 +101,9 @@ def rivals(*slopes: float) -> tuple[Any, Any]:
         shape = np.concatenate([3 + slope * TIME for slope in of])[:, None]
         J = np.stack([0 * shape, shape, np.ones_like(shape)], -1)
         place = np.repeat(np.arange(len(of)), len(TIME))
-        runs = SimpleNamespace(y=y, session=0 * place, along=np.zeros(len(y)), outputs=("y",), condition=place)
+        runs = SimpleNamespace(
+            y=y, session=0 * place, along=np.zeros(len(y)), outputs=("y",), condition=place, memory=None
+        )
         every = (*known, start)
         return SimpleNamespace(
             runs=runs, coefficients=every, nuisances=(), effects=(),

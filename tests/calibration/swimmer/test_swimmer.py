@@ -192,10 +192,17 @@ def test_settings_are_those_of_the_lab_to_the_last_digit() -> None:
     assert model.runs.omega == pytest.approx([s["omega_rpm"] * math.pi / 30 for s in settings])
 
 
+def test_a_range_is_some_values_of_it() -> None:
+    lab = read_lab_settings(["l_cm=5..160,7", "x=-1..1"])
+    assert lab["l_cm"] == (5.0, 10.0, 20.0, 40.0, 80.0, 160.0, 7.0)
+    assert lab["x"] == (-1.0, -0.6, -0.2, 0.2, 0.6, 1.0)
+
+
 @pytest.mark.parametrize(
     ("entry", "said"),
     [
         ("l_cm", "write COLUMN=VALUE"),
+        ("l_cm=5..", "write COLUMN=VALUE"),
         ("l_cm=5,", "write COLUMN=VALUE"),
         ("length=5", "none of N, l_cm, omega_rpm"),
         ("l_cm=-5", "must be positive"),
@@ -203,7 +210,7 @@ def test_settings_are_those_of_the_lab_to_the_last_digit() -> None:
         ("N=2.5", "integer from 1"),
         ("N=1000", "integer from 1"),
     ],
-    ids=["no value", "half a list", "column", "negative", "nan", "half a tail", "many tails"],
+    ids=["no value", "half a range", "half a list", "column", "negative", "nan", "half a tail", "many tails"],
 )
 def test_what_cannot_be_set_is_refused(entry: str, said: str) -> None:
     with pytest.raises(InputError, match=said):

@@ -142,24 +142,26 @@ def pair(*differences: float) -> Pair:
 
 
 def test_a_batch_repeats_the_best_setting_unless_a_parameter_or_a_session_absorbs_it() -> None:
-    chosen, strength = _greedy([pair(1.0, 3.0, 2.0)], Noise(np.array([[0.5]]), 0.0))
+    chosen, strength = _greedy([pair(1.0, 3.0, 2.0)], Noise(np.array([[0.5]]), 0.0), np.ones(3))
     assert chosen == [1] * BATCH
     assert strength == pytest.approx(BATCH * 9 / 0.5)
     shifted = Pair(np.array([[1.0], [-1.0]]), np.ones((2, 1, 1)), np.array([[1e6]]))  # all outputs alike
-    assert _together([shifted], Noise(np.eye(1), 0.0), [0] * 8) == pytest.approx(0, abs=1e-3)
-    chosen, strength = _greedy([shifted], Noise(np.eye(1), 0.0))
+    assert _together([shifted], Noise(np.eye(1), 0.0), np.ones(2), [0] * 8) == pytest.approx(0, abs=1e-3)
+    chosen, strength = _greedy([shifted], Noise(np.eye(1), 0.0), np.ones(2))
     assert chosen == [0] * 4 + [1] * 4
     assert strength == pytest.approx(8, rel=1e-3)
     scatter = Noise(np.eye(1), 10.0)  # of sessions, which shift the runs of a day
-    alike, opposite = (_together([pair(1.0, -1.0)], scatter, places)[0] for places in ([0, 0], [0, 1]))
+    alike, opposite = (_together([pair(1.0, -1.0)], scatter, np.ones(2), places)[0] for places in ([0, 0], [0, 1]))
     assert alike == pytest.approx(2 / 21)
     assert opposite == pytest.approx(2.0)
+    of_starts = _together([pair(1.0, -1.0)], scatter, np.zeros(2), [0, 0])  # no session shifts them
+    assert of_starts == pytest.approx(2.0)
 
 
 def test_a_batch_serves_all_pairs_of_rivals() -> None:
     """The first setting tells the first two apart, the second the others: a batch for all has both."""
     pairs = [pair(3.0, 0.0), pair(0.0, 2.0), pair(0.0, 2.0)]
-    chosen, strength = _greedy(pairs, Noise(np.eye(1), 0.0))
+    chosen, strength = _greedy(pairs, Noise(np.eye(1), 0.0), np.ones(2))
     assert set(chosen) == {0, 1}
     assert chosen.count(1) > chosen.count(0)
     assert strength == pytest.approx(min(9 * chosen.count(0), 4 * chosen.count(1)))

@@ -34,7 +34,7 @@ from tests.shared import shared
 Record = dict[str, Any]
 
 OF_A_ROBOT = re.compile(
-    r"robot|\btails?\b|tank|camera|motor|swim|softflagella|corrected\.toml|slip angle|heading", re.IGNORECASE
+    r"robot|\btails?\b|tank|camera|motor|swim|corrected\.toml|slip angle|heading", re.IGNORECASE
 )
 OF_RUNS = re.compile(r"\bruns?\b|\bsession|\brepeat|\bconditions\b|\btable of (?!evidence)|number of tails")
 NAMES_RUNS = re.compile(  # where it is said what a swim cannot tell
@@ -75,6 +75,7 @@ SWIM = {"row": "pose", "locked_test": "last third of swim", "sessions": ["swim"]
         "errors_by_output": dict.fromkeys(("uncalibrated", "before", "after", "law"), POSE),
         "scatter_of_a_run": POSE}  # fmt: skip
 BATCH = {"runs": 4 * [{"depth": 4.0}], "decides": 0.9, "worth_making": True}
+TRACE = {**BATCH, "runs": [{"depth": 4.0, "t_s": "0 to 9", "readings": 10, "read": "as often"}]}
 GAINS: dict[str, Record] = {
     "certain": {"error_after": 0.04, "gain_interval": [0.05, 0.11], "gain_is_certain": True},
     "uncertain": {"error_after": 0.119, "gain_interval": [-0.01, 0.02], "gain_is_certain": False},
@@ -137,7 +138,9 @@ def combinations(verdict: str) -> Iterator[Record]:
             },
         ),
     }
-    batches: tuple[Record, ...] = ({}, {"next_batch": BATCH}, {"next_batch": {**BATCH, "worth_making": False}})
+    batches: tuple[Record, ...] = (
+        {}, *({"next_batch": {**of, "worth_making": worth}} for of in (BATCH, TRACE) for worth in EITHER)
+    )  # fmt: skip
     gains = tuple(GAINS.values())
     imitable: tuple[Record, ...] = ({}, {"imitable": True})
     claim = {"claims": [WALL], "parameters": {**falling_balls()["parameters"], "wall": SIZE}}
