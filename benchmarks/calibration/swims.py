@@ -17,6 +17,7 @@ Takes two minutes a robot.
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ from sim.knowledge import COEFFICIENTS, CalibrationKnowledge
 from sim.model.robot import Robot
 from sim.motion.warm import compile_once
 from tests.oracles.drawn_swims import LabSwim, drawn_swim
-from tests.oracles.swim_scores import sized, strengths
+from tests.oracles.swim_scores import SwimScores
 from tests.oracles.swims import CameraNoise, make_track
 
 _NOTHING, _EFFECT = "nothing", "an effect, λ = 8"
@@ -54,13 +55,13 @@ _ASKED = {
 
 def hidden(swim: LabSwim, seed: int) -> tuple[str, Robot]:
     """Choose an effect that one swim can show; return its name and the robot with it."""
-    rng = np.random.default_rng([seed, 1])
+    rng, scores = np.random.default_rng([seed, 1]), SwimScores(swim)
     names = [n for n, i in influences().items() if i.needs is None and n not in (TRACKED_POINT, *_SLOW)]
-    of = strengths(swim, names)
-    for name in rng.permutation([n for n in names if of[n] > 0]).tolist():
-        robot = sized(swim.truth, name, int(rng.choice([-1, 1])) * _STRENGTH / of[name])
-        if robot is not None:
-            return name, robot
+    for name in rng.permutation(names).tolist():
+        with suppress(InputError):  # the simulation fails
+            robot = scores.sized(name, int(rng.choice([-1, 1])), _STRENGTH)
+            if robot is not None:
+                return name, robot
     raise InputError("no effect shows")
 
 

@@ -1,22 +1,21 @@
 """How much of an effect the track of a swim shows.
 
-The size λ of an effect is in standard deviations of its score in the first two thirds of a swim, under the true
-covariance of the camera's noise and of the kicks, beside all that is fitted anyway. It is that of the linear model
-about the truth: in replays the phase of the disc at each flip changes with everything, and with three tails a
+The size λ of an effect is the root of the deviance that it leaves in the first two thirds of a swim without
+noise, under the true covariance of the camera's noise and of the kicks, when all that is fitted anyway is fitted.
+The swim is that of vehicles: in replays the phase of the disc at each flip changes with everything, and with three tails a
 robot whose coefficients are 7 % off can be 4.7 standard deviations from all that are like it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from calibration.linear.gls import schur_complement
-from calibration.statistics.forward import derivatives
-from calibration.statistics.statistical_model import precisions, start_values
+from calibration.statistics.fit import fit
+from calibration.statistics.statistical_model import start_values
 from calibration.swim.course import Vehicles
 from calibration.swim.measured_swim import read_swims
 from calibration.swim.pose_noise import Sizes
@@ -29,25 +28,49 @@ from sim.model.robot import Robot
 from tests.oracles.drawn_swims import LabSwim
 from tests.oracles.swims import CameraNoise, make_track
 
+_TYPICAL, _TRIES, _CLOSE = 0.2, 6, 0.08  # of an effect's typical size; of sizes; of λ
 
-def strengths(swim: LabSwim, names: Sequence[str]) -> dict[str, float]:
-    """Compute λ for a unit of each of some effects, on its scale."""
-    truth, camera = swim.truth, swim.disturbed["camera"]
-    exact = CameraNoise(camera.every, (0.0, 0.0), (0.0, 0.0))
-    swims = read_swims(make_track(truth, swim.plan, seed=0, camera=exact), swim.plan)
-    runs, held_out = runs_of_swims(swims, truth.tail_length)
-    units = np.array([truth.tail_length, 1.0])
-    white, slow, kick = (np.array(each) / units for each in (camera.white, camera.slow, swim.disturbed["kick"]))
-    runs = runs.in_noise(Sizes(white, slow, kick, camera.memory), runs.poses)
-    inner = SwimmerModel(truth, both_directions(truth), 1)
-    model = SwimModel(inner, Sight(runs), runs, Vehicles.of(swims, truth.time_scale))
-    fitted, effects = (*model.coefficients, *model.nuisances), [influences()[name].parameter for name in names]
-    derivative = derivatives(model, start_values(model), [*fitted, *effects])[1]
-    table = derivative[~runs.left_out(held_out)].reshape(-1, len(fitted) + len(effects))
-    normal = table.T @ table
-    normal[range(len(fitted)), range(len(fitted))] += precisions(fitted)
-    squares = np.diag(schur_complement(normal, len(fitted)))
-    return dict(zip(names, np.sqrt(np.maximum(squares, 0.0)).tolist(), strict=True))
+
+class SwimScores:
+    """The model of a true robot's swim in the true noise."""
+
+    def __init__(self, swim: LabSwim):
+        self.truth, camera = swim.truth, swim.disturbed["camera"]
+        exact = CameraNoise(camera.every, (0.0, 0.0), (0.0, 0.0))
+        swims = read_swims(make_track(self.truth, swim.plan, seed=0, camera=exact), swim.plan)
+        runs, held_out = runs_of_swims(swims, self.truth.tail_length)
+        units, kick = np.array([self.truth.tail_length, 1.0]), swim.disturbed["kick"]
+        white, slow, step = (np.array(each) / units for each in (camera.white, camera.slow, kick))
+        runs = runs.in_noise(Sizes(white, slow, step, camera.memory), runs.poses)
+        inner = SwimmerModel(self.truth, both_directions(self.truth), 1)
+        self.model = SwimModel(inner, Sight(runs), runs, Vehicles.of(swims, self.truth.time_scale))
+        self.used = ~runs.left_out(held_out)
+
+    def strength(self, name: str, value: float) -> float:
+        """Compute λ of an effect of some value."""
+        start, model = start_values(self.model), self.model
+        names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
+        runs = replace(model.runs, y=model.predict([{**start, name: value}])[0])
+        without = replace(model, runs=runs, sight=replace(model.sight, runs=runs))
+        return math.sqrt(max(fit(without, start, names, self.used, title="").deviance, 0.0))
+
+    def sized(self, name: str, side: int, strength: float) -> Robot | None:
+        """Return the robot with an effect at λ = `strength` on one side of its null, if that is plausible.
+
+        Raises:
+            InputError: it cannot be simulated.
+        """
+        effect = influences()[name].parameter
+        low, high = effect.plausible or effect.bounds
+        size = side * _TYPICAL * abs(effect.typical)
+        for _ in range(_TRIES):
+            if not low <= effect.start + size <= high:
+                return None
+            level = self.strength(name, effect.start + size)
+            if abs(level / strength - 1) < _CLOSE:
+                return with_influence(self.truth, name, effect.start + size)
+            size *= min(strength / max(level, 1e-3), 10.0)
+        return None
 
 
 def with_influence(robot: Robot, name: str, value: float) -> Robot:
@@ -59,11 +82,3 @@ def with_influence(robot: Robot, name: str, value: float) -> Robot:
         return replace(robot, motor_speed=robot.motor_speed * (1 - value))
     numbers: dict[str, Any] = {n: getattr(robot, n) * part**power for n, power in influence.one_tail.items()}
     return replace(robot, **numbers)
-
-
-def sized(truth: Robot, name: str, size: float) -> Robot | None:
-    """Return a robot with an effect of a size on its scale; None if that is not plausible."""
-    effect = influences()[name].parameter
-    low, high = effect.plausible or effect.bounds
-    value = effect.changed(effect.start, size)
-    return with_influence(truth, name, value) if low <= value <= high else None

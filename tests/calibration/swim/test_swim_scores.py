@@ -13,7 +13,7 @@ from sim.knowledge import COEFFICIENTS, NUMBERS
 from sim.mechanics import planar
 from sim.motion.run import Resolution
 from tests.oracles.drawn_swims import LabSwim, drawn_swim
-from tests.oracles.swim_scores import sized, strengths, with_influence
+from tests.oracles.swim_scores import SwimScores, with_influence
 from tests.oracles.swims import CameraNoise, make_track, swum
 from tests.planner.plans import CONTROL, planned
 from tests.shared import shared
@@ -69,21 +69,23 @@ def test_strength_is_that_of_replays() -> None:
         columns.append(flat(swum(other, plan, resolution).at(time) - poses) / 0.01)
     root = np.linalg.cholesky(covariance)
     free = np.linalg.qr(np.linalg.solve(root, np.stack(columns, 1)))[0]
-    scores = strengths(lab(), [*ODD])
+    scores = SwimScores(lab())
     for name, size in ODD.items():
         other = with_influence(CONTROL, name, size)
         change = np.linalg.solve(root, flat(swum(other, plan, resolution).at(time) - poses))
         expected = np.linalg.norm(change - free @ (free.T @ change))
-        assert scores[name] * size == pytest.approx(expected, rel=0.1)
+        assert scores.strength(name, size) == pytest.approx(expected, rel=0.1)
         assert expected < 0.6 * np.linalg.norm(change)
 
 
 def test_effects_are_sized_or_left_out() -> None:
-    robot = sized(CONTROL, "left_right_bias", -0.1)
-    assert robot is not None
-    assert robot.effects == {"left_right_bias": -0.1}
-    assert sized(CONTROL, "left_right_bias", 0.7) is None
-    assert sized(CONTROL, "end_over_end_drag", -1.0) is None  # none is negative
+    scores = SwimScores(lab())
+    found = scores.sized("left_right_bias", -1, 8.0)
+    assert found is not None
+    assert found.effects["left_right_bias"] < 0
+    assert scores.strength("left_right_bias", found.effects["left_right_bias"]) == pytest.approx(8.0, rel=0.08)
+    assert scores.sized("one_tail_missing", 1, 8.0) is None  # coefficients do the same
+    assert scores.sized("end_over_end_drag", -1, 8.0) is None  # none is negative
 
 
 def test_drawn_swims_can_be_seen_and_differ() -> None:
