@@ -55,10 +55,17 @@ class KeptClear:
     clearance: float  # smallest, of the body on the predicted track
     detours: tuple[Detour, ...]  # in the order of the path
 
-    def lines(self, robot: Scales) -> list[str]:
-        """Say how the plan keeps clear, a sentence for each detour and one for the margin."""
+    def lines(self, robot: Scales, error: str) -> list[str]:
+        """Say how the plan keeps clear, a sentence for each detour and one for the margin.
+
+        Args:
+            error: that the margin covers, in words.
+        """
         margin, clearance = (in_lab(value, robot) for value in (self.margin, self.clearance))
-        last = f"margin {margin} around the body; predicted clearance {clearance}"
+        last = (
+            f"a margin of {margin} around the body covers the {error}, so within that it touches nothing; as "
+            f"predicted it passes at a distance of {clearance}"
+        )
         return [*(detour.line(robot) for detour in self.detours), last]
 
     def to_dict(self) -> dict[str, Any]:

@@ -15,7 +15,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 RAW, DECLARED, PREDICTED, REPLAYED = "#b0b0b0", "#1a1a1a", "#2a7fba", "#c8452f"
+START = "#2b8a3e"
 KEEP_OUT, BODY = "#d8b365", "#8a4fa3"
+_START = 0.5  # length of the arrow of the heading, in l
+_DIRECTIONS, _DIRECTION = (
+    (0.2, 0.5, 0.8),
+    0.02,
+)  # of the path: where arrows say which way it goes, and their length
 _WIDE, _HIGH = 0.65, 1.2  # of a letter, over the size of the font
 _ASIDE = (1.0, 2.0, 3.0)  # distances of a label from its point, over the size of the font
 _WAYS = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1], [0, 1], [0, -1], [1, 0], [-1, 0]])
@@ -41,6 +47,31 @@ def draw_tracks(axes: Axes, raw: Floats, declared: Floats, stated: float, length
     axes.set_aspect("equal")
     axes.set_xlabel("x [cm]")
     axes.set_ylabel("y [cm]")
+
+
+def draw_start(axes: Axes, start: tuple[float, float, float], way: Floats, length: float) -> None:
+    """Draw where the robot starts and how it heads, and along the path which way it goes, on axes in cm.
+
+    Args:
+        axes: where to draw.
+        start: x, y and heading, in l and rad.
+        way: points of the path (n, 2), in cm.
+        length: of a tail, in cm.
+    """
+    place, heading = length * np.array(start[:2]), np.array([np.cos(start[2]), np.sin(start[2])])
+    axes.plot(*place, "o", color=START, ms=5, label="start, with heading")
+    tip = place + _START * length * heading
+    axes.annotate(
+        "", (tip[0], tip[1]), (place[0], place[1]), arrowprops={"arrowstyle": "-|>", "color": START, "lw": 1.5}
+    )
+    axes.update_datalim([tip])
+    along = np.append(0.0, np.cumsum(np.hypot(*np.diff(way, axis=0).T)))
+    for share in _DIRECTIONS:
+        ends = (share + np.array([_DIRECTION, 0.0])) * along[-1]
+        (x, before_x), (y, before_y) = (np.interp(ends, along, column) for column in way.T)
+        axes.annotate(
+            "", (x, y), (before_x, before_y), arrowprops={"arrowstyle": "->", "color": DECLARED, "lw": 1.2}
+        )
 
 
 def draw_regions(axes: Axes, free_space: FreeSpace, length_scale: float) -> None:

@@ -314,14 +314,14 @@ class Plan(Shown, Generic[J]):
         Args:
             ax: default: axes of a new figure.
         """
-        from planner.planning.picture import DECLARED, PREDICTED, draw_regions, draw_tracks
+        from planner.planning.picture import PREDICTED, draw_regions, draw_start, draw_tracks
 
         ax = given_axes(ax)
         length = self.robot.length_scale
         draw_tracks(ax, self.drawn.polyline(), self.reference, self.stated_error, length)
         points = 100 * length * self.smooth_track
         ax.plot(*points.T, color=PREDICTED, lw=0.8, label="predicted")
-        ax.plot(*points[0], "o", color=DECLARED, ms=5)
+        draw_start(ax, self.start, 100 * length * self.reference, 100 * length)
         if self.kept_clear is not None:
             draw_regions(ax, self.kept_clear.free_space, length)
         if self.job is not None:
@@ -343,7 +343,8 @@ class Plan(Shown, Generic[J]):
 
     def conditions(self) -> list[str]:
         """Say what the plan keeps clear of, how its laps differ, and what it does for its job."""
-        kept_clear = [] if self.kept_clear is None else self.kept_clear.lines(self.robot)
+        error = "stated error with feedback" if self.request.feedback else "stated error"
+        kept_clear = [] if self.kept_clear is None else self.kept_clear.lines(self.robot, error)
         lap = [] if self.lap is None else [self.lap.line(self.robot)]
         return [*kept_clear, *lap, *([] if self.job is None else self.job.lines(self))]
 

@@ -2,8 +2,8 @@
 
 The size λ of an effect is the root of the deviance that it leaves in the first two thirds of a swim without
 noise, under the true covariance of the camera's noise and of the kicks, when all that is fitted anyway is fitted.
-The swim is that of vehicles: in replays the phase of the disc at each flip changes with everything, and with three tails a
-robot whose coefficients are 7 % off can be 4.7 standard deviations from all that are like it.
+The swim is that of vehicles: in replays the phase of the disc at each flip changes with everything, and with three
+tails a robot whose coefficients are 7 % off can be 4.7 standard deviations from all that are like it.
 """
 
 from __future__ import annotations

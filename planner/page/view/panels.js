@@ -34,7 +34,7 @@ function showResults(plan, tails) {
       ["Drawn points from the path to follow", `${size(plan.missed)} at most`],
     ]),
   ];
-  if (plan.margin) pairs.push(["Kept clear", `${size(plan.margin)} around the body; predicted clearance ${size(plan.clearance)}`]);
+  if (plan.margin) pairs.push(["Kept clear", `a margin of ${size(plan.margin)} covers the error, so within that the body touches nothing; as predicted it passes at a distance of ${size(plan.clearance)}`]);
   const exact = "no farther from the path, however long it is, if the robot moves exactly as predicted; no real one does";
   if (plan.guaranteed !== null) pairs.push(["Bound for an exact vehicle", `${size(plan.guaranteed)}: ${exact}`]);
   describe(byId("facts"), pairs);

@@ -11,6 +11,7 @@ from typing import Any, get_type_hints
 
 import numpy as np
 import pytest
+from matplotlib.text import Annotation
 
 from common.errors import InputError, InputWarning
 from planner.files.headers import schedule_header
@@ -373,3 +374,18 @@ def test_a_schedule_too_short_for_its_path_is_an_error_of_the_planner(monkeypatc
     monkeypatch.setattr(line_of_sight, "follow_dwells", stopped)
     with pytest.raises(RuntimeError, match="error of the planner"):
         plan(circle(2.0), CONTROL, objective="flips")
+
+
+@pytest.mark.parametrize("way", [1, -1], ids=["counter-clockwise", "clockwise"])
+def test_a_picture_shows_the_heading_at_the_start_and_which_way_the_path_goes(way: int) -> None:
+    points = polygon(4, side=2.0).points[::way]
+    result = plan(Path2D.of(points, closed=True), CONTROL)
+    start, *along = [text for text in result.plot().texts if isinstance(text, Annotation)]
+    (tip, foot), cm = (np.array(end) for end in (start.xy, start.xyann)), 100 * CONTROL.tail_length
+    x, y, heading = result.start
+    assert foot == pytest.approx([cm * x, cm * y])
+    assert math.atan2(*(tip - foot)[::-1]) == pytest.approx(math.remainder(heading, 2 * math.pi))
+    assert len(along) == 3
+    for arrow in along:
+        (to_x, to_y), (x, y) = arrow.xy, arrow.xyann
+        assert math.copysign(1, x * to_y - y * to_x) == way  # about the middle of the square
