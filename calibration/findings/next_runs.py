@@ -52,10 +52,9 @@ GIVEN_UP = 2 * math.log(STOP)  # the same as a difference of deviances
 BATCH = 8  # runs
 SELDOM = 0.5  # share of cases in which runs must decide to be worth making
 _DRAWS = 4000
-_DECIDES = 3.84  # difference of χ² at which one of the two is chosen
 _PROPOSED, _PROPOSED_WHOLE = 3, 15  # single settings; swims or traces
 _WANTED = 0.9  # share of draws that should decide
-_ENOUGH = 13.1  # λ at which they do
+_ENOUGH = 17.0  # λ at which they do
 _MOST_REPEATS = 16
 _MOST_RIVALS = 4
 _WIDE = 1e3  # standard deviation of a number of new runs' own without a tolerance, in typical sizes or logarithms
@@ -69,7 +68,7 @@ class NextRun:
     settings: dict[str, Any]  # column -> value
     repeats: int  # of the setting
     separation: float  # λ of all repeats
-    decides: float  # share of draws in which the true one is chosen
+    decides: float  # share of draws in which the wrong one is given up
 
     @property
     def worth_making(self) -> bool:
@@ -91,7 +90,7 @@ class Batch:
 
     settings: tuple[dict[str, Any], ...]  # of each run; the same settings may come more than once
     separation: float  # λ of the batch, for the two rivals that it tells apart least
-    decides: float  # share of draws in which the true one of these two is chosen
+    decides: float  # share of draws in which the wrong one of these two is given up
 
     @property
     def worth_making(self) -> bool:
@@ -165,9 +164,9 @@ def next_runs(rivals: Sequence[Hypothesis], *, seed: int = 0) -> tuple[tuple[Nex
 
 
 def _decides(strength: float, rng: np.random.Generator) -> float:
-    """Estimate the share of draws in which the true one is chosen; χ² of the wrong one over it is λ + 2 √λ z."""
+    """Estimate the share of draws in which the wrong one is given up; its χ² over the true one's is λ + 2 √λ z."""
     draws = strength + 2 * np.sqrt(strength) * rng.normal(size=_DRAWS)
-    return float((draws > _DECIDES).mean())
+    return float((draws > GIVEN_UP).mean())
 
 
 def _greedy(pairs: Sequence[Pair], noise: Noise, along: Floats) -> tuple[list[int], float]:

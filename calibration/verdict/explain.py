@@ -151,14 +151,13 @@ def _forecast(study: Study, began: Work, of_first_tests: float, of_a_test: float
 
     def forecast(count: int, seconds: float) -> None:
         single = count * max(seconds, of_a_test)
-        left = seconds_left(began)
-        ends = f"; the search ends after about {_duration(left)}" * (left < math.inf)
+        pairs_take, left = FIRST * (of_first_tests + single), seconds_left(began)
+        ends = f"; the search ends after about {_duration(left)}" * (left < single + pairs_take)
         if study.progress:
             print(
                 f"there is more than noise: {count} effect{'s' * (count > 1)} to fit take{'s' * (count == 1)} "
                 f"{_duration(single)} of processor time; if none explains the runs, pairs follow, "
-                f"{_duration(FIRST * (of_first_tests + single))} at most, "
-                f"mostly much less{ends}",
+                f"{_duration(pairs_take)} at most, mostly much less{ends}",
                 file=sys.stderr,
             )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -10,8 +11,10 @@ import pytest
 from calibration.attribution.hypothesis import Evidence, Hypothesis, Origin
 from calibration.attribution.rules import RULES, Trial, doubted
 from calibration.findings.held_out import HeldOutErrors
+from calibration.statistics.budget import Work, limited, work_done
 from calibration.statistics.study import Study
 from calibration.verdict import calibrate
+from calibration.verdict.explain import _forecast
 from calibration.verdict.verdict import Verdict
 from calibration.words.render import next_steps
 from common.errors import InputError
@@ -127,3 +130,18 @@ def test_coefficients_that_the_runs_do_not_determine_are_named() -> None:
     said = "these runs determine C_t and C_yr to no better than a factor of two"
     assert said in calibrated(two_tails, few=FEW_CANDIDATES).caveats
     assert not any("factor of two" in limit for limit in none().caveats)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "comes_first"), [(1e4, False), (5.0, True)], ids=["a long one", "a short one"]
+)
+def test_the_end_of_the_search_is_told_where_it_comes_before_all_fits(
+    seconds: float, comes_first: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shown: Any = SimpleNamespace(progress=True)
+    with limited(Work(seconds=seconds)):
+        _forecast(shown, work_done(), 1.0, 0.1)(3, 2.0)
+    said = capsys.readouterr().err
+    assert "3 effects to fit take 6 s of processor time" in said
+    assert "pairs follow, 21 s at most" in said
+    assert ("the search ends after about 5 s" in said) == comes_first
