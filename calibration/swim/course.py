@@ -29,7 +29,6 @@ from sim.motion.response import responses
 from sim.motion.steady import steady
 
 _TOLERANCE, _MESHES = 3e-4, (4, 6)  # of the curves: at 1e-3 they are rough in the numbers of a robot
-_COARSE = 1e-3  # tolerance of non-local effects
 _DWELLS = np.concatenate([np.geomspace(0.02, DWELLS[0], 8)[:-1], DWELLS])  # a camera sees tails turn over
 _STEP = 0.1  # of `_size`, for slopes of lags; what time steps leave in them is larger than their curvature
 _FAR = 0.1  # of `_distance`, from which slopes are simulated again
@@ -62,12 +61,11 @@ class Vehicles:
     """Makes vehicles of robots: their twists are solved for, their lags simulated.
 
     Lags take longer than steady motions, so what was simulated is kept. For derivatives, the lags of robots close
-    to one are its own, and their slopes times the change. Slopes are simulated at a robot not far away. In
-    non-local effects, with which a flip can take minutes, lags are linear.
+    to one are its own, and their slopes times the change. Slopes are simulated at a robot not far away.
     """
 
     before: Floats = field(default_factory=BEFORE.copy)  # dwells before, at which the memory is simulated
-    known: dict[tuple[_Columns, int, float], Lags] = field(default_factory=dict)  # by robot, direction, tolerance
+    known: dict[tuple[_Columns, int], Lags] = field(default_factory=dict)  # by robot, direction
     slopes: dict[tuple[_Columns, str, int], Lags] = field(default_factory=dict)  # by robot, column, direction
     centres: list[_Columns] = field(default_factory=list)  # robots of slopes
 
@@ -114,12 +112,12 @@ class Vehicles:
         Raises:
             InputError: a flip breaks down.
         """
-        near = [_at_work(dict(robot) if first is None else first, local=True) for robot, _ in wanted]
+        near = [robot if first is None else _at_work(first) for robot, _ in wanted]
         simulated = self._simulated([(robot, sense) for robot, (_, sense) in zip(near, wanted, strict=True)])
         changes = [_change(robot, other) for robot, (other, _) in zip(near, wanted, strict=True)]
         centre = self._centre(near[0])
         moved = [
-            {name: (self.centres[0] if _nonlocal(name) else centre, name, sense) for name in change}
+            {name: (centre, name, sense) for name in change}
             for change, (_, sense) in zip(changes, wanted, strict=True)
         ]
         self._learn([*dict.fromkeys(key for keys in moved for key in keys.values())])
@@ -131,21 +129,21 @@ class Vehicles:
             for lags, change, keys in zip(simulated, changes, moved, strict=True)
         ]  # fmt: skip
 
-    def _simulated(self, wanted: Sequence[tuple[_Columns, int]], tolerance: float = _TOLERANCE) -> list[Lags]:
+    def _simulated(self, wanted: Sequence[tuple[_Columns, int]]) -> list[Lags]:
         """Simulate the lags of robots, each in one direction of its motor, unless they are known."""
         wanted = [(robot, 1 if _even(robot) else sense) for robot, sense in wanted]
-        if new := [each for each in dict.fromkeys(wanted) if (*each, tolerance) not in self.known]:
+        if new := [each for each in dict.fromkeys(wanted) if each not in self.known]:
             robots = [dict(robot) for robot, _ in new]
             names = sorted({name for robot in robots for name in robot})
             columns = {name: np.array([robot.get(name, _null(name)) for robot in robots]) for name in names}
             columns["omega_bar"] = columns["omega_bar"] * np.array([sense for _, sense in new])
             groups = Groups.from_columns(check_columns(columns))
-            curves = responses(groups, tolerance=tolerance, meshes=_MESHES, before=self.before, dwells=_DWELLS)
+            curves = responses(groups, tolerance=_TOLERANCE, meshes=_MESHES, before=self.before, dwells=_DWELLS)
             if curves.failed.any():
                 raise InputError(_BROKE)
             tables = lag_table(curves.lag, curves.memory, self.before, _DWELLS), resampled(curves.rest, _DWELLS)
-            self.known.update(((*each, tolerance), Lags(*of)) for each, *of in zip(new, *tables, strict=True))
-        return [self.known[*each, tolerance] for each in wanted]
+            self.known.update((each, Lags(*of)) for each, *of in zip(new, *tables, strict=True))
+        return [self.known[each] for each in wanted]
 
     def _centre(self, robot: _Columns) -> _Columns:
         """Find the robot whose slopes hold for another; if none is near, it is this one."""
@@ -156,18 +154,17 @@ class Vehicles:
 
     def _learn(self, wanted: Sequence[tuple[_Columns, str, int]]) -> None:
         """Simulate those slopes that are not known, by robot, column and direction of the motor."""
-        for nonlocal_, tolerance in ((False, _TOLERANCE), (True, _COARSE)):
-            new = [key for key in wanted if key not in self.slopes and _nonlocal(key[1]) == nonlocal_]
-            values = [dict(centre).get(name, _null(name)) for centre, name, _ in new]
-            steps = [_step(name, value) for (_, name, _), value in zip(new, values, strict=True)]
-            before = [(centre, sense) for centre, _, sense in new]
-            after = [
-                (_at_work({**dict(centre), name: value + step}), sense)
-                for (centre, name, sense), value, step in zip(new, values, steps, strict=True)
-            ]
-            lags = self._simulated([*before, *after], tolerance)
-            for key, step, *ends in zip(new, steps, lags, lags[len(new) :], strict=False):
-                self.slopes[key] = Lags(*((b - a) / step for a, b in zip(*ends, strict=True)))
+        new = [key for key in wanted if key not in self.slopes]
+        values = [dict(centre).get(name, _null(name)) for centre, name, _ in new]
+        steps = [_step(name, value) for (_, name, _), value in zip(new, values, strict=True)]
+        before = [(centre, sense) for centre, _, sense in new]
+        after = [
+            (_at_work({**dict(centre), name: value + step}), sense)
+            for (centre, name, sense), value, step in zip(new, values, steps, strict=True)
+        ]
+        lags = self._simulated([*before, *after])
+        for key, step, *ends in zip(new, steps, lags, lags[len(new) :], strict=False):
+            self.slopes[key] = Lags(*((b - a) / step for a, b in zip(*ends, strict=True)))
 
 
 def _null(name: str) -> float:
@@ -179,18 +176,10 @@ def _even(robot: _Columns) -> bool:
     return all(effect_named(name).symmetry == "even" for name, _ in robot if is_effect(name))
 
 
-def _nonlocal(name: str) -> bool:
-    return is_effect(name) and effect_named(name).reach == "nonlocal"
-
-
-def _at_work(robot: Mapping[str, float], *, local: bool = False) -> _Columns:
-    """Sort the columns of a robot, without effects at their null, or also without non-local ones."""
+def _at_work(robot: Mapping[str, float]) -> _Columns:
+    """Sort the columns of a robot, without effects at their null."""
     return tuple(
-        sorted(
-            (name, value)
-            for name, value in robot.items()
-            if not is_effect(name) or (value != _null(name) and not (local and _nonlocal(name)))
-        )
+        sorted((name, value) for name, value in robot.items() if not is_effect(name) or value != _null(name))
     )
 
 

@@ -281,8 +281,8 @@ class Runs:
 
     @property
     def row(self) -> str:
-        """What a row is, in a word: "run", or "pose"."""
-        return "run"
+        """What a row is, in a word: "run", "reading" of a trace, or "pose"."""
+        return "run" if self.trace is None else "reading"
 
     def nearer(self, used: Flags) -> list[Flags]:
         """List sets of runs (n,) among `used` at one end of the settings; a claim must carry over to the rest.

@@ -228,7 +228,7 @@ def p_in_words(p_value: float, draws: int) -> str:
 def given(record: Record, number: Record) -> str:
     """Write the value of a nuisance parameter that was given; that of an offset or a scale is in the table."""
     if number["given"] in (0.0, 1.0) and (number["unit"] == "1" or number["scale"] != "logarithm"):
-        return "as in the table" if record["row"] == "run" else "as given"
+        return "as in the table" if record["row"] in ("run", "reading") else "as given"
     return f"{plain(number['given'] * number['shown'], 4)} {number['unit']}"
 
 

@@ -33,7 +33,7 @@ from tests.oracles.swims import CameraNoise, make_track, swum
 from tests.planner.plans import CONTROL
 from tests.sim.robots import CONTROL_VALUES, control, first_body
 
-THREE = replace(CONTROL, tails=3)
+THREE, FIVE = (replace(CONTROL, tails=tails) for tails in (3, 5))
 KICK, CURRENT = (1e-4, 0.003), (2e-5, 0.0)
 
 
@@ -70,7 +70,14 @@ def farthest(model: SwimModel, at: dict[str, float]) -> Floats:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("robot", "effects"), [(CONTROL, {}), (CONTROL, {"left_right_bias": 0.1}), (THREE, {"disc_drag": 0.2})]
+    ("robot", "effects"),
+    [
+        (CONTROL, {}),
+        (CONTROL, {"left_right_bias": 0.1}),
+        (THREE, {"disc_drag": 0.2}),
+        (FIVE, {"contact_line": 0.5}),
+        (FIVE, {"natural_curvature": 0.3}),
+    ],
 )
 def test_poses_are_those_of_the_simulator(robot: Robot, effects: dict[str, float]) -> None:
     """Within 0.8 mm and 0.3° of a path of 8 l, also just after flips.
