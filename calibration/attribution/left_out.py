@@ -1,6 +1,7 @@
 """What left-out runs say: each is predicted from the other sessions, by one linear step, and gains are paired.
 
-Numbers that left-out runs have of their own are fitted to these runs, since others know them hardly or not at all.
+Numbers of a group, such as the start of a trace, are known to the other runs with a covariance C, which is large
+where these hardly know them. So white residuals r become (1 + J C Jᵀ)^−½ r, with their derivatives J.
 
 Two gains share the runs without either model, so their own standard errors say nothing about which one is larger.
 So two models are compared by the difference of the log likelihoods, paired over conditions: with C conditions of
@@ -15,7 +16,6 @@ C − 1 degrees of freedom: a few conditions prove little.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -25,10 +25,9 @@ from calibration.linear.gls import Noise, solve_normal
 from calibration.statistics.fit import Fit
 from calibration.statistics.signed_ranks import signed_rank_p
 from calibration.statistics.study import Study, leave_one_group_out
-from common.arrays import Flags, Floats, Integers
+from common.arrays import Floats, Integers
 
 _QUANTILE = 0.975
-_LITTLE = 0.1  # sum of squared derivatives, over that of the left-out runs
 
 
 class PairedGain(NamedTuple):
@@ -89,24 +88,23 @@ def left_out_residual(study: Study, fitted: Fit, noise: Noise) -> Floats:
     """Whiten the residual of all fitted runs, in the order of `left_out_rows`, each from the other sessions."""
     data, parts = study.model.runs, []
     for learn, out in leave_one_group_out(data, study.split.fitted):
-        step = solve_normal(fitted.normal_of_fit(data, learn, noise))[0]
+        step, covariance = solve_normal(fitted.normal_of_fit(data, learn, noise))
         predicted = (data.y - fitted.prediction)[out] - fitted.tangents[out] @ step
         whiten = noise.whitener(data.session[out], data.scale[out], data.along[out])
-        parts.append(_without_own_numbers(fitted, whiten(predicted), learn, out, whiten))
+        parts.append(_of_groups_known_so_well(fitted, whiten(predicted), covariance, whiten(fitted.tangents[out])))
     return np.concatenate(parts)
 
 
-def _without_own_numbers(
-    fitted: Fit, white: Floats, learn: Flags, out: Flags, whiten: Callable[[Floats], Floats]
-) -> Floats:
-    """Take from a white residual of the runs `out` what numbers of a group change of which others say little."""
-    others, these = ((fitted.tangents[rows] ** 2).sum((0, 1)) for rows in (learn, out))
-    hardly = (others <= _LITTLE * these) & (these > 0)
-    own = [place for place in np.flatnonzero(hardly).tolist() if fitted.fitted[place].of_group]
+def _of_groups_known_so_well(fitted: Fit, white: Floats, covariance: Floats, slopes: Floats) -> Floats:
+    """Multiply a white residual (m,) by (1 + J C Jᵀ)^−½, J of the numbers of groups among the `slopes` (m, p)."""
+    own = [place for place, p in enumerate(fitted.fitted) if p.of_group]
     if not own:
         return white
-    basis = np.linalg.qr(whiten(fitted.tangents[out][..., own]))[0]
-    return np.asarray(white - basis @ (basis.T @ white))
+    sizes = np.sqrt(np.maximum(np.diag(covariance)[own], np.finfo(float).tiny))
+    variances, axes = np.linalg.eigh(covariance[np.ix_(own, own)] / np.outer(sizes, sizes))
+    spread = slopes[:, own] @ (sizes[:, None] * axes * np.sqrt(np.maximum(variances, 0.0)))
+    vectors, spreads, _ = np.linalg.svd(spread, full_matrices=False)
+    return np.asarray(white + vectors @ ((1 / np.sqrt(1 + spreads**2) - 1) * (vectors.T @ white)))
 
 
 def left_out_rows(study: Study) -> Integers:

@@ -164,7 +164,8 @@ def plot_summary(axes: Axes, result: Findings) -> None:
 def draw_held_out(result: Findings) -> Figure:
     """Draw measured minus model for the output that gains most, in the held-out runs; of traces in the median one.
 
-    Runs are drawn against the setting that tells most of what the calibrated model leaves, traces against time.
+    Runs are drawn against the setting that tells most of what the calibrated model leaves, of those that differ
+    between held-out runs; traces against time.
     """
     data, rows, k = result.runs, result.split.test, _gaining(result)[0]
     (factor, unit), title, styles = data.scale_of(data.outputs[k]), data.title_of(data.outputs[k]), ("s", "o")
@@ -175,16 +176,19 @@ def draw_held_out(result: Findings) -> Figure:
         rows, words = traces[len(traces) // 2]
         along, label, styles, title = np.asarray(data.time), _time_label(data), ("-", "-"), f"{title}, {words}"
     else:
-        settings = data.settings
+        differing = {name: of for name, of in data.settings.items() if np.ptp(of[0][rows]) > 0}
+        settings = differing or data.settings
         name = max(settings, key=lambda name: _told(settings[name][0], residuals[0][1], result.split.fitted))
         along, label = settings[name][0], _labelled(name, settings[name][1].strip())
+        title = f"{title}, the {rows.sum()} held-out {data.row}s"
     figure = Figure(figsize=(_WIDTH, 3.2), layout="constrained")
     axes = figure.add_subplot()
     if band := _band(result, k):
         axes.axhspan(-factor * band, factor * band, color=PALE, alpha=0.5, lw=0, label="± 2 σ of the noise")
     axes.axhline(0, color=INK, lw=0.6)
     for (model, residual), colour, style in zip(residuals, (ORANGE, GREEN), styles, strict=False):
-        axes.plot(along[rows], factor * residual[rows], style, ms=5, color=colour, label=model)
+        hollow = {"mfc": "none", "ms": 7} if style == "s" else {"ms": 4}
+        axes.plot(along[rows], factor * residual[rows], style, color=colour, label=model, **hollow)
     axes.set_xlabel(label, fontsize=9)
     axes.set_ylabel(f"measured − model{f' [{unit}]' if unit else ''}", fontsize=9)
     axes.set_title(fill(title, 2 * _LINE), fontsize=9, loc="left", parse_math=False)

@@ -46,11 +46,12 @@ def badges(record: Record) -> list[str]:
     explained = record["verdict"] not in ("partial", "unexplained")
     refuted = record["held_out_error_falls"] is False or record["gain_is_certain"] is False
     doubted = record["imitable"] or (record["number_check"] or {}).get("uncertain")
+    unconfirmed = refuted or (explained and not record["held_out_runs_agree"])
     found = {
-        kind: record["noise_known"] or record["verdict"] != "none",
+        kind: (record["noise_known"] or record["verdict"] != "none") and not (kind == "claimed" and unconfirmed),
         "noise unknown": not record["noise_known"],
         "provisional": record["not_tried"],
-        "not confirmed": refuted or (explained and not record["held_out_runs_agree"]),
+        "not confirmed": unconfirmed,
         "look-alikes possible": doubted,
     }
     return [words for words, holds in found.items() if holds]

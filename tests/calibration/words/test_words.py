@@ -124,7 +124,7 @@ def test_rivals_are_told_apart_by_runs_that_are_worth_making_and_a_command() -> 
         )
 
     often, seldom = proposing(0.95, 0.93, 0.14), proposing(0.14, 0.14)
-    (place,) = (i for i, step in enumerate(next_steps(often)) if step.startswith("Make the 8 runs of the table"))
+    (place,) = (i for i, step in enumerate(next_steps(often)) if step.startswith("Make the 8 runs listed under"))
     assert "`softflagella calibration decide " in next_steps(often)[place + 1]
     assert next_steps(seldom)[place].startswith("Do not make runs with these settings")
     assert "decide in 14 % of cases only" in next_steps(seldom)[place]
@@ -170,7 +170,7 @@ def test_the_swim_that_decides_is_named_with_its_command(
     seen = in_report(record)
     assert "path robot minutes plan decides" in seen
     assert f"circle:2l as given 21.2 softflagella plan circle:2l {path_decides:.0%}".replace("%", " %") in seen
-    assert "runs of the table" not in " ".join(steps)
+    assert "runs listed under" not in " ".join(steps)
 
 
 def test_a_pull_that_is_not_taken_to_be_wrong_has_its_reason() -> None:
