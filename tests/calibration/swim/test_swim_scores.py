@@ -21,7 +21,7 @@ from tests.shared import shared
 FITTED = 2 / 3  # of a swim
 CAMERA = CameraNoise(every=2.0, white=(8e-5, 0.002), slow=(6e-5, 0.004), memory=7.0)  # small for a short swim
 KICK = (2e-5, 4e-4)
-ODD = {"left_right_bias": 1e-3, "natural_curvature": 1e-3}  # coefficients do not do the same
+ODD = {"left_right_bias": 3e-3, "natural_curvature": 0.02}  # coefficients do not do the same
 
 
 @shared
