@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
-from calibration.findings.next_runs import Decision, new_runs, read_explanations
+from calibration.findings.next_runs import Decision, read_explanations, refuse_nothing_to_decide
 from calibration.findings.next_runs import decide as decide_between
 from calibration.laws.law_model import with_law
 from calibration.own_model.declared import Model
@@ -64,6 +62,7 @@ def decide(
     """
     if isinstance(verdict, Verdict):
         explanations, before = list(verdict.explanations), set(verdict.runs.session_names)
+        refuse_nothing_to_decide(explanations)
     else:
         explanations, before = read_explanations(verdict)
     roles = Roles(session=session, specimen=specimen, trace=trace)
@@ -72,11 +71,8 @@ def decide(
             raise InputError("decide: plan is not for a model of your own; leave it out")
         model = read_function_model(table, robot, roles)
         memory = explanations[0].memory
-        if memory is None:
-            return decide_between(model, explanations, before)
-        decision = decide_between(whitened(model, *memory), explanations, before)
-        new = new_runs(model.runs, before)
-        return replace(decision, new_runs=len(np.unique(model.runs.groups("trace")[0][new])))
+        white = whitened(model, *memory) if memory and model.runs.trace is not None else model
+        return decide_between(white, explanations, before)
     if any(roles):
         raise InputError("decide: session, specimen and trace are not for a robot; leave them out")
     file = None if isinstance(table, pd.DataFrame) else table
@@ -84,7 +80,6 @@ def decide(
         measured = open_table(table)
     if plan is not None or is_track(measured):
         swum, _ = swim_model(one_robot(robot), read_swims(measured, plan, file=file), jobs=jobs)
-        decision = decide_between(swum, explanations, before)
-        return replace(decision, new_runs=sum(swim.name not in before for swim in swum.runs.swims))
+        return decide_between(swum, explanations, before)
     steady = SwimmerModel(one_robot(robot), read_measurements(measured, file=file), jobs)
     return decide_between(steady, explanations, before, with_law)

@@ -91,18 +91,19 @@ def left_out_residual(study: Study, fitted: Fit, noise: Noise) -> Floats:
         step, covariance = solve_normal(fitted.normal_of_fit(data, learn, noise))
         predicted = (data.y - fitted.prediction)[out] - fitted.tangents[out] @ step
         whiten = noise.whitener(data.session[out], data.scale[out], data.along[out])
-        parts.append(_of_groups_known_so_well(fitted, whiten(predicted), covariance, whiten(fitted.tangents[out])))
+        white, own = whiten(predicted), [place for place, p in enumerate(fitted.fitted) if p.of_group]
+        if own:
+            slopes = whiten(fitted.tangents[out][..., own])
+            white = _known_so_well(white, slopes, covariance[np.ix_(own, own)])
+        parts.append(white)
     return np.concatenate(parts)
 
 
-def _of_groups_known_so_well(fitted: Fit, white: Floats, covariance: Floats, slopes: Floats) -> Floats:
-    """Multiply a white residual (m,) by (1 + J C Jᵀ)^−½, J of the numbers of groups among the `slopes` (m, p)."""
-    own = [place for place, p in enumerate(fitted.fitted) if p.of_group]
-    if not own:
-        return white
-    sizes = np.sqrt(np.maximum(np.diag(covariance)[own], np.finfo(float).tiny))
-    variances, axes = np.linalg.eigh(covariance[np.ix_(own, own)] / np.outer(sizes, sizes))
-    spread = slopes[:, own] @ (sizes[:, None] * axes * np.sqrt(np.maximum(variances, 0.0)))
+def _known_so_well(white: Floats, slopes: Floats, covariance: Floats) -> Floats:
+    """Multiply a white residual (m,) by (1 + J C Jᵀ)^−½, with slopes J (m, q) and C (q, q)."""
+    sizes = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
+    variances, axes = np.linalg.eigh(covariance / np.outer(sizes, sizes))
+    spread = slopes @ (sizes[:, None] * axes * np.sqrt(np.maximum(variances, 0.0)))
     vectors, spreads, _ = np.linalg.svd(spread, full_matrices=False)
     return np.asarray(white + vectors @ ((1 / np.sqrt(1 + spreads**2) - 1) * (vectors.T @ white)))
 

@@ -312,6 +312,12 @@ class Standing:
         return self.behind > GIVEN_UP
 
 
+def refuse_nothing_to_decide(explanations: Sequence[Any] | None) -> None:
+    """Refuse a verdict that has nothing to decide."""
+    if not explanations:
+        raise InputError("this verdict has no two explanations between which new runs could decide")
+
+
 def read_explanations(path: str | Path) -> tuple[list[Explanation], set[str]]:
     """Read the explanations that the runs of a verdict.json could not tell apart, and the sessions of these runs.
 
@@ -320,8 +326,7 @@ def read_explanations(path: str | Path) -> tuple[list[Explanation], set[str]]:
     """
     with expecting("a verdict.json of this version", path, "calibrate the table again"):
         record = read_json(path)
-        if not record.get("explanations"):
-            raise InputError("this verdict has no two explanations between which new runs could decide")
+        refuse_nothing_to_decide(record.get("explanations"))
         explanations = [Explanation.read(explanation) for explanation in record["explanations"]]
         sessions = set(map(str, record["sessions"]))
     return explanations, sessions
@@ -419,4 +424,6 @@ def decide(
 ) -> Decision:
     """Judge explanations by the runs of sessions that were not among those `before`, see `standings`."""
     new = new_runs(model.runs, before)
-    return Decision(tuple(standings(model, explanations, new, with_law)), int(new.sum()))
+    return Decision(
+        tuple(standings(model, explanations, new, with_law)), len(np.unique(model.runs.made_at_once[new]))
+    )

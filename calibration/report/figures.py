@@ -187,8 +187,8 @@ def draw_held_out(result: Findings) -> Figure:
         axes.axhspan(-factor * band, factor * band, color=PALE, alpha=0.5, lw=0, label="± 2 σ of the noise")
     axes.axhline(0, color=INK, lw=0.6)
     for (model, residual), colour, style in zip(residuals, (ORANGE, GREEN), styles, strict=False):
-        hollow = {"mfc": "none", "ms": 7} if style == "s" else {"ms": 4}
-        axes.plot(along[rows], factor * residual[rows], style, color=colour, label=model, **hollow)
+        marker = {"mfc": "none", "ms": 7} if style == "s" else {"ms": 4}
+        axes.plot(along[rows], factor * residual[rows], style, color=colour, label=model, **marker)
     axes.set_xlabel(label, fontsize=9)
     axes.set_ylabel(f"measured − model{f' [{unit}]' if unit else ''}", fontsize=9)
     axes.set_title(fill(title, 2 * _LINE), fontsize=9, loc="left", parse_math=False)

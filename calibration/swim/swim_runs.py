@@ -92,6 +92,10 @@ class SwimRuns(Runs):
         return self.block
 
     @property
+    def made_at_once(self) -> Integers:
+        return self.session
+
+    @property
     def resampled(self) -> Integers:
         return self.block
 

@@ -138,6 +138,11 @@ class Runs:
         return self.condition if self.trace is None else self.trace
 
     @property
+    def made_at_once(self) -> Integers:
+        """Number what a lab makes at once, (n,): runs, traces or swims."""
+        return np.arange(len(self)) if self.trace is None else self.trace
+
+    @property
     def resampled(self) -> Integers:
         """Number what is resampled, (n,): conditions, or a fifth of a trace."""
         if self.trace is None:

@@ -145,5 +145,8 @@ def test_keywords_of_the_other_kind_are_refused() -> None:
         sf.decide(table, verdict(), "paper-control", trace="run")
     with pytest.raises(InputError, match="all sessions of this table were there before"):
         sf.decide(table, verdict(), MODEL, trace="run", session="day")
+    found = sf.calibrate(table, MODEL.without("growth"), trace="run", session="day", progress=False)
+    with pytest.raises(InputError, match="no two explanations"):
+        sf.decide(table, found, MODEL, trace="run", session="day")
     with pytest.raises(InputError, match="give --robot, or --model"):
         main(["calibration", "decide", "runs.csv", "verdict.json"])

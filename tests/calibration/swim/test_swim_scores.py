@@ -78,6 +78,17 @@ def test_strength_is_that_of_replays() -> None:
         assert expected < 0.6 * np.linalg.norm(change)
 
 
+def test_what_is_fitted_anyway_leaves_nothing() -> None:
+    """Of other coefficients; of a number, at most how far it is off in its standard deviation."""
+    scores = SwimScores(lab())
+    assert scores.strength("left_right_bias", 0.01) > 5
+    for name in COEFFICIENTS:
+        assert scores.strength(name, 1.01 * getattr(CONTROL, name)) < 0.2
+    for name in NUMBERS[:2]:
+        by = 0.5 * CONTROL.sigma(name).of(CONTROL.number(name))
+        assert scores.strength(name, CONTROL.number(name) + by) < 0.55
+
+
 def test_effects_are_sized_or_left_out() -> None:
     scores = SwimScores(lab())
     found = scores.sized("left_right_bias", -1, 8.0)

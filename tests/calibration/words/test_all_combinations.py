@@ -34,8 +34,9 @@ from tests.shared import shared
 Record = dict[str, Any]
 
 OF_A_ROBOT = re.compile(
-    r"robot|\btails?\b|tank|camera|motor|swim|corrected\.toml|slip angle|heading", re.IGNORECASE
+    r"robot|\btails?\b|tank|camera|motor|swim|softflagella|corrected\.toml|slip angle|heading", re.IGNORECASE
 )
+DECIDE = "softflagella calibration decide TABLE verdict.json --model MODEL"  # of any model
 OF_RUNS = re.compile(r"\bruns?\b|\bsession|\brepeat|\bconditions\b|\btable of (?!evidence)|number of tails")
 NAMES_RUNS = re.compile(  # where it is said what a swim cannot tell
     r"from runs with other numbers of tails and tail lengths|by runs with other numbers of tails and tail lengths|"
@@ -230,7 +231,7 @@ def test_every_combination_is_said_in_whole_sentences_with_one_advice(verdict: s
         assert not re.search(r"\bNone\b|\bnan\b|Undefined|\.\.", seen), seen
         if record["subject"] == "model":
             for text in (said, errors, *steps, seen):
-                assert not OF_A_ROBOT.search(text), text
+                assert not OF_A_ROBOT.search(text.replace(DECIDE, "")), text
         if record["row"] == "pose":
             for text in (said, errors, *steps, seen):
                 assert not OF_RUNS.search(
