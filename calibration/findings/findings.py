@@ -168,6 +168,17 @@ class Findings:
         return self.attribution.final
 
     @property
+    def models(self) -> dict[str, str]:
+        """What each model with an error on the held-out runs is called; "after" only where it adds something."""
+        named = {"uncalibrated": "model unchanged", "before": "refitted"}
+        if self.verdict == "number":
+            free = " and ".join(of.title for of in self.attribution.explanations[0].added)
+            named["after"] = f"refitted, {free} free"
+        elif adopted := self.nearest or next(iter(self.claims), None):
+            named["after"] = f"refitted with {' and '.join(of.title for of in adopted.added)}"
+        return named | {"law": "refitted with the best law"} if "law" in self.errors.rms else named
+
+    @property
     def error_uncalibrated(self) -> float:
         """Relative error of the model as given on the held-out runs."""
         return self.errors.rms["uncalibrated"]

@@ -322,6 +322,7 @@ def _errors(result: Findings) -> dict[str, Any]:
     errors = result.errors
     return {
         **{f"error_{name}": errors.rms.get(name) for name in MODELS},
+        "models": result.models,
         "error_corrected": result.error_corrected,
         "harmless": result.harmless,
         "held_out_error_falls": result.held_out_error_falls,

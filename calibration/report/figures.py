@@ -26,7 +26,7 @@ from calibration.report.path_error import WORDS, Model, PathError
 from calibration.statistics.residual_tests import Misfit
 from calibration.statistics.statistical_model import Parameter
 from calibration.table.runs import Runs
-from calibration.words.quantities import feature_in_words, final_model
+from calibration.words.quantities import feature_in_words
 from common.arrays import Flags, Floats
 from common.pages import BLUE, GREEN, INK, ORANGE, PALE, RED, VIOLET
 from common.units import split
@@ -125,11 +125,12 @@ def _figures_of_law(law: Hypothesis, used: Flags) -> list[Drawn]:
 
 def compared(result: Findings) -> list[tuple[str, Floats]]:
     """List the models whose residuals are drawn, with their predictions (n, k)."""
-    models = [("calibrated", result.base.prediction)]
-    if final := final_model(result.verdict, result.nearest, result.effects):
-        models.append((final, result.final.prediction))
+    names = result.models
+    models = [(names["before"], result.base.prediction)]
+    if "after" in names:
+        models.append((names["after"], result.final.prediction))
     elif result.described and result.law is not None:
-        models.append(("with the law in corrected.toml", result.law.prediction))
+        models.append((names["law"], result.law.prediction))
     return models
 
 
@@ -164,7 +165,7 @@ def plot_summary(axes: Axes, result: Findings) -> None:
 def draw_held_out(result: Findings) -> Figure:
     """Draw measured minus model for the output that gains most, in the held-out runs; of traces in the median one.
 
-    Runs are drawn against the setting that tells most of what the calibrated model leaves, of those that differ
+    Runs are drawn against the setting that tells most of what the refitted model leaves, of those that differ
     between held-out runs; traces against time.
     """
     data, rows, k = result.runs, result.split.test, _gaining(result)[0]
@@ -390,10 +391,10 @@ def _name_kinds(axes: Axes, kinds: Sequence[str]) -> None:
 
 def draw_maps(result: Findings) -> list[tuple[Figure, str]]:
     """Draw z of every output along every feature of the inputs, a figure for each model; each with its model."""
-    maps = [("calibrated", result.attribution.misfit)]
+    names = result.models
+    maps = [(names["before"], result.attribution.misfit)]
     if result.claims and result.claims[0].evidence.remainder is not None:
-        final = final_model(result.verdict, result.nearest, result.effects)
-        maps.append((final, result.claims[0].evidence.remainder))
+        maps.append((names["after"], result.claims[0].evidence.remainder))
     limit = max(4.0, float(np.abs(result.attribution.misfit.scores.shapes).max(initial=0.0)))
     return [(_draw_map(misfit, result.runs, limit), label) for label, misfit in maps if misfit.scores.shapes.size]
 

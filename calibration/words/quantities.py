@@ -63,11 +63,9 @@ def held_out_errors(record: Record) -> tuple[list[str], dict[str, list[str]]]:
         Outputs, and model -> an error of each. Outputs that share a unit are taken together; of outputs in
         several units those `SHOWN` are shown that gain most.
     """
-    described = record["described"]
-    final = "with the law" if described else final_model(record["verdict"], record["nearest"], record["effects"])
-    models = {"as given": "uncalibrated", "calibrated": "before"}
-    if final:
-        models = {"calibrated": "before", final: "law" if described else "after"}
+    named, final = record["models"], "law" if record["described"] else "after"
+    shown_models = ("before", final) if final in named else ("uncalibrated", "before")
+    models = {named[model]: model for model in shown_models}
     noise = {f"noise of a {record['row']}": "noise"} if record["noise_known"] else {}
     names = record["outputs"]
     if _shared_scale(record)[1] != _SEVERAL:
@@ -277,9 +275,9 @@ def sized(value: float, interval: Sequence[float], of: Record, count: int = 3) -
 def of_theory(value: float, interval: Sequence[float], of: Record, exactly: bool = False) -> str:
     """Write the size of an effect with its interval, over the size that theory gives where that is 1."""
     if exactly:
-        return f"{size(value, of)}, as theory has it"
+        return "at the size of theory"
     words = sized(value, interval, of)
-    return words.replace(" (", " of theory (", 1) if of.get("theory") == 1 == of["shown"] else words
+    return words.replace(" (", " times the size of theory (", 1) if of.get("theory") == 1 == of["shown"] else words
 
 
 def detectable(value: float, of: Record) -> str:
@@ -311,12 +309,3 @@ def ranges_in_words(settings: Mapping[str, tuple[float, float, str]]) -> str:
         f"{name} = {plain(low)}{unit}" if low == high else f"{name} from {plain(low)} to {plain(high)}{unit}"
         for name, (low, high, unit) in settings.items()
     )
-
-
-def final_model(verdict: str, nearest: object, effects: Sequence[str]) -> str:
-    """Name the final model of a verdict, in words for a column or a caption; empty if it is the calibrated one."""
-    if verdict == "number":
-        return "with the fitted value"
-    if nearest:
-        return "with the nearest effect"
-    return "with the verdict's effects" if effects else ""

@@ -127,7 +127,6 @@ def _environment() -> Environment:
     )
     environment.filters |= _FILTERS | {name: pass_context(words) for name, words in _OF_OUTPUTS.items()}
     environment.globals |= {
-        "final_model": quantities.final_model,
         "held_out_errors": pass_context(quantities.held_out_errors),
         "gain_in_words": pass_context(quantities.gain_in_words),
     }

@@ -35,7 +35,7 @@ def result(*, outputs: int = 1, held_out: int = 3, final: bool = True, known: bo
     gains = dict(zip(TITLES, (0.9, 0.1, 0.5), strict=True))
     return SimpleNamespace(
         runs=runs, split=SimpleNamespace(test=test, fitted=~test), law=None, described=False, nearest=None,
-        verdict="effect" if final else "none", effects=("lag",) if final else (),
+        models={"before": "refitted"} | ({"after": "refitted with a lag"} if final else {}),
         base=SimpleNamespace(prediction=curve), errors=SimpleNamespace(
             by_output={"before": dict.fromkeys(names, 1.0), "after": gains}),
         final=SimpleNamespace(prediction=curve + error[:, None] / 2, noise=noise),
@@ -51,8 +51,8 @@ def test_the_best_the_median_and_the_worst_trace_are_drawn_above_the_residuals()
     assert not others
     assert output == TITLES["T"]
     assert titles(figure) == [
-        "cup 0, least error", "cup 1, median", "cup 2, largest error", "measured − calibrated",
-        "measured − with the verdict's effects",
+        "cup 0, least error", "cup 1, median", "cup 2, largest error", "measured − refitted",
+        "measured − refitted with a lag",
     ]  # fmt: skip
     assert [len(axes.lines) for axes in figure.axes[3:]] == [4, 4]  # three traces were fitted, and zero
     before, after = (np.abs(axes.lines[0].get_ydata()).max() for axes in figure.axes[3:])
@@ -64,7 +64,7 @@ def test_the_best_the_median_and_the_worst_trace_are_drawn_above_the_residuals()
 )
 def test_fewer_traces_are_drawn_where_there_are_fewer(held_out: int, words: list[str]):
     ((figure, _),) = draw_curves(result(held_out=held_out, final=False))
-    assert titles(figure) == [*words, "measured − calibrated"]
+    assert titles(figure) == [*words, "measured − refitted"]
 
 
 def test_ratios_are_drawn_as_they_were_measured_and_their_residuals_in_per_cent():

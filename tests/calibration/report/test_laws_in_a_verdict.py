@@ -125,7 +125,7 @@ def test_an_uncertain_claim_is_set_beside_the_laws_that_fit_as_well(tmp_path: Pa
     assert any(step.startswith("Test the claim where it matters most: make runs with other") for step in steps)
     assert verdict.gain_is_certain is False
     assert steps[0].startswith("Plan with neither robot yet")
-    assert "so laws were fitted to the calibrated model without it" in report.read_text()
+    assert "so laws were fitted to the refitted model without it" in report.read_text()
     assert list(load_robot(corrected).effects) == [DRAG]
     assert load_robot(corrected).learnt_from is None
 

@@ -108,6 +108,13 @@ def with_flags(verdict: str, changes: Record) -> Record:
     record = {**falling_balls(), "verdict": verdict, "error_uncalibrated": 0.2, "error_before": 0.12, **changes}
     claimed, adopted = record["claims"], record["nearest"]
     record["effects"] = [name for claim in claimed for name in claim["effects"]]
+    record["models"] = {"uncalibrated": "model unchanged", "before": "refitted"}
+    if verdict == "number":
+        record["models"]["after"] = "refitted, a number free"
+    elif adopted or claimed:
+        record["models"]["after"] = f"refitted with {(adopted or claimed[0])['title']}"
+    if isinstance(record["error_law"], float):
+        record["models"]["law"] = "refitted with the best law"
     record["imitability"], record["transfer_p"] = len(claimed) * [0.1], len(claimed) * [1.0]
     falls_with_it = None if verdict in ("none", "unexplained") else record["error_after"] < record["error_before"]
     record["held_out_error_falls"] = falls_with_it
@@ -266,7 +273,7 @@ def test_what_the_loop_found_has_its_sections() -> None:
     assert "The loop" in seen
     assert "1 – 12.00 % speed along depth" in seen
     assert "decoy 9.00 % no" in seen
-    assert "on conditions that were not fitted (balls 2 and 5): calibrated 12.00 %" in errors_in_words(record)
+    assert "on conditions that were not fitted (balls 2 and 5): refitted 12.00 %" in errors_in_words(record)
     assert "<td>4.00 %</td>" in sections(record, {})
 
 
@@ -289,7 +296,7 @@ def test_errors_of_differences_are_in_the_unit_that_they_share(scales: Record, u
     said, errors, seen = sentence(record), errors_in_words(record), in_report(record)
     assert f"falls from 0.12{unit} to 0.04{unit} (by 0.08{unit}, 95 % interval 0.05 to 0.11{unit})" in said
     assert not re.search(r"\b(12|4)\.00 %", seen)
-    assert f"as given 0.2{unit}, calibrated 0.12{unit}, with the nearest effect 0.04{unit}" in errors
+    assert f"model unchanged 0.2{unit}, refitted 0.12{unit}, refitted with {NEAREST['title']} 0.04{unit}" in errors
     for text in (said, errors, *next_steps({**record, "advice": "as given"})):
         assert not re.search(r"\b\d+\.\d+ %", text), text
 
@@ -297,7 +304,7 @@ def test_errors_of_differences_are_in_the_unit_that_they_share(scales: Record, u
 def test_errors_of_ratios_and_slip_angles_are_in_per_cent() -> None:
     """As a robot's: the slip angle is shown in degrees, and compared in radians."""
     record = with_flags("none", {"output_scales": {"speed": [100.0, "%"], "theta": [57.3, "°"]}})
-    assert "as given 20.00 %, calibrated 12.00 %" in errors_in_words(record)
+    assert "model unchanged 20.00 %, refitted 12.00 %" in errors_in_words(record)
 
 
 @pytest.mark.parametrize("unit", ["rad", "deg", "m", ""])
@@ -312,5 +319,5 @@ def test_errors_of_ratios_and_differences_are_each_in_its_unit(unit: str) -> Non
     assert falls_to in sentence(claimed)
     assert "(95 % interval without zero)" in sentence(claimed)
     errors = errors_in_words(with_flags("none", changes))
-    assert f"calibrated speed 5.0 % and angle 0.3 {unit}".rstrip() in errors
+    assert f"refitted speed 5.0 % and angle 0.3 {unit}".rstrip() in errors
     assert f"noise of a run speed 2.0 % and angle 0.1 {unit}".rstrip() in errors
