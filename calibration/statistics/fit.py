@@ -26,7 +26,8 @@ after some steps is given up, as one with a `target`.
 
 The deviance along one parameter, with the others refitted, may differ from a parabola. So `profile_intervals` runs
 the model at both ends of the interval that the covariance gives. Each end moves to where the deviance, as a
-parabola on its side, has risen by t². Here t is the quantile of `Fit.interval`.
+parabola on its side, has risen by t². Here t is the quantile of `Fit.interval`. Where it rises by less than half
+as much, or more than twice, the valley is bent, and the others are refitted at each end that is tried.
 
 The pull of a nuisance parameter says how far the runs move it from its stated value.
 """
@@ -88,12 +89,15 @@ _ON_BOUND = 1e-9  # distance in typical sizes
 _BLIND = 1e-12  # share of the largest eigenvalue below which a combination of parameters shows nothing
 _NEARLY_CERTAIN = 1e-6  # standard deviation of a parameter that is held, in typical sizes
 _KEPT = 0.25  # share of the promised fall below which the next step is damped
-_UNSETTLED = 1.0  # a fit has not converged if one more step is expected to reduce it by more
+_UNSETTLED = (
+    1.0  # a fit has not converged if one more step is expected to reduce rᵀ Σ⁻¹ r by more, over that of noise
+)
+_ROUGH, _IDLE = 4.0, 8  # the same, where so many steps gained less than _UNSETTLED, since the model is rough
 _BENDS = 0.01  # departure from a linear model, in the variance of the noise
 _EXACT = 1e-12  # of a guessed variance: what runs without noise leave
 _PROFILE = 0.05  # share of a size to which an end of its interval is found
-_FLAT = 0.05  # share of the expected rise; if the rise is smaller, the deviance is flat and the end stays
-_STEEP = 5.0  # if it is larger, the others were not refitted along a bent valley, and the end stays
+_FLAT, _STEEP = 0.5, 2.0  # shares of the expected rise between which the deviance is a parabola
+_WIDER, _TRIES = 4.0, 4  # of an end in a bent valley: its distance over that by the covariance; fits
 
 
 @dataclass(frozen=True)
@@ -248,10 +252,7 @@ class Fit:
         Raises:
             UnsolvedError, InputError: the model cannot be solved on the way.
         """
-        estimated, numbers = (self.noise.run_covariance, self.repeats), self.wrong_numbers
-        return fit(
-            self.model, self.parameters, self.names, rows, wrong_numbers=numbers, estimated=estimated, title=""
-        )
+        return _refit(self, self.parameters, self.names, rows)
 
     def _bends(self, parameters: Parameters, linear: Floats) -> bool:
         """Tell whether the model departs from a linear prediction (n, k) by what the noise would show."""
@@ -307,7 +308,7 @@ def fit(
             if not estimated and problem.above(point) > 0:
                 point = _nearer(problem, point, rough)
             search = _Search(min(target, problem.far), steps=_STEPS_FROM_NEAR)
-        point, session_ratio = _descend(problem, point, search)
+        point, session_ratio, at_rest = _descend(problem, point, search)
         stopped = spent()
     at_end = problem.normal(point, session_ratio)
     ahead = bounded_step(fitted, point.parameters, at_end)
@@ -335,7 +336,7 @@ def fit(
         jacobian=point.derivative,
         noise=Noise(run_covariance, linear.session_ratio),
         deviance=float(normal[-1, -1] + products.determinant(linear.session_ratio)),
-        converged=ahead.promise < _UNSETTLED * problem.noise_level(at_end),
+        converged=ahead.promise < (_ROUGH if at_rest else _UNSETTLED) * problem.noise_level(at_end),
         held=ahead.held,
         full_normal=point.products.for_fit(linear.session_ratio)[0],
         wrong_numbers=wrong_numbers,
@@ -491,8 +492,10 @@ def _nearer(problem: _Problem, point: _Point, rough: ForwardModel) -> _Point:
     return min(point, problem.at(end.parameters), key=problem.above)
 
 
-def _descend(problem: _Problem, point: _Point, search: _Search) -> tuple[_Point, Floats]:
+def _descend(problem: _Problem, point: _Point, search: _Search) -> tuple[_Point, Floats, bool]:
     """Find the least rᵀ W r from `point`, and its ρ. A step to where the model is not solved quickly is too long.
+
+    The last value tells whether the search is at rest: steps of several lengths have gained next to nothing.
 
     A wrong model crawls along a bent valley far above the noise. The search ends there as soon as all steps that
     are left, with what the present one promises, would not come down to its target.
@@ -502,6 +505,7 @@ def _descend(problem: _Problem, point: _Point, search: _Search) -> tuple[_Point,
     refused = False  # whether the step before did not improve the fit
     solved = True  # whether the model could be solved wherever it was tried
     session_ratio, estimates = point.products.session_ratio(passes=0), 0
+    reached: list[float] = []  # rᵀ W r before each step
     for count in range(1, _MOST_STEPS + 1):
         normal = problem.normal(point, session_ratio)
         step = _step(fitted, point.parameters, normal, least)
@@ -512,6 +516,7 @@ def _descend(problem: _Problem, point: _Point, search: _Search) -> tuple[_Point,
             normal = problem.normal(point, session_ratio)
             step = _step(fitted, point.parameters, normal, least)
         small = _SMALL * problem.noise_level(normal)
+        reached.append(float(normal[-1, -1]))
         if step.promise < search.small * problem.noise_level(normal) and count > 1:
             break
         above = float(normal[-1, -1]) - search.target
@@ -543,7 +548,8 @@ def _descend(problem: _Problem, point: _Point, search: _Search) -> tuple[_Point,
             least, refused = max(step.damping + 1 + refused, 2), True  # each costs as much as one that does
             if least >= len(_DAMPING):
                 break
-    return point, session_ratio
+    idle = solved and len(reached) > _IDLE and reached[-_IDLE] - reached[-1] < _UNSETTLED
+    return point, session_ratio, idle
 
 
 def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: Floats, least: int) -> _FitStep:
@@ -635,25 +641,25 @@ def _freedom(products: NormalEquations, session_ratio: Floats, count: int) -> Fl
 
 
 def profile_intervals(
-    model: ForwardModel, fitted: Fit, used: Flags, *, title: str = ""
+    model: ForwardModel, fitted: Fit, used: Flags, *, in_valleys: bool = True, title: str = ""
 ) -> dict[str, tuple[float, float]]:
     """Compute the 95 % interval of every fitted parameter, by its profile deviance; by the covariance of nuisance
     parameters, of numbers of a group's own, and of what is held at a bound.
+
+    Args:
+        in_valleys: refit the others where the deviance is no parabola.
     """
     data, count = model.runs, len(fitted.names)
+    nuisances = {p.name for p in model.nuisances}
     along = solve_normal(fitted.normal_of_fit(data, used))[1]
     sets, ends = [], []
     for i, p in enumerate(fitted.fitted):
-        if p.sigma is not None or p.of_group or fitted.held[i]:
+        if (p.sigma is not None and p.name in nuisances) or p.of_group or fitted.held[i]:
             continue
         half = fitted.half_width(i)
         for side in (-1, 1):
-            end = p.moved(fitted.parameters[p.name], side * half)
-            change = (
-                math.log(end / fitted.parameters[p.name]) if p.logarithmic else end - fitted.parameters[p.name]
-            )
-            step = along[i] / along[i, i] * change  # how the others change with it
-            sets.append(apply_step(fitted.fitted, fitted.parameters, step))
+            change = float(p.change(fitted.parameters[p.name], p.moved(fitted.parameters[p.name], side * half)))
+            sets.append(apply_step(fitted.fitted, fitted.parameters, along[i] / along[i, i] * change))
             ends.append((i, change))
     predictions = model.predict(sets, title=title)
     least = _deviance(fitted, data, used, list(range(count)))
@@ -661,13 +667,80 @@ def profile_intervals(
     for (i, change), parameters, prediction in zip(ends, sets, predictions, strict=True):
         others = [j for j in range(count) if j != i]
         end_of = replace(fitted, parameters=parameters, prediction=prediction)
-        rise = _deviance(end_of, data, used, others) - least
-        expected = change**2 / along[i, i]
-        scale = math.sqrt(expected / rise) if _FLAT * expected < rise < _STEEP * expected else 1.0
+        rise, expected = _deviance(end_of, data, used, others) - least, change**2 / along[i, i]
         p = fitted.fitted[i]
-        intervals.setdefault(p.name, []).append(p.moved(fitted.parameters[p.name], change * scale))
+        if _FLAT * expected < rise < _STEEP * expected or not (others and in_valleys):
+            change *= math.sqrt(expected / np.clip(rise, _FLAT * expected, None))
+        else:
+            change = _end_in_valley(fitted, parameters, p, change, expected, used)
+        intervals.setdefault(p.name, []).append(float(p.moved(fitted.parameters[p.name], change)))
     by_profile = {name: (low, high) for name, (low, high) in intervals.items()}
     return {name: by_profile.get(name) or fitted.interval(name) for name in fitted.names}
+
+
+def _end_in_valley(
+    fitted: Fit, near: Parameters, p: Parameter, change: float, expected: float, used: Flags
+) -> float:
+    """Find the change of a parameter at which the deviance has risen as expected, the others refitted at each try.
+
+    Args:
+        near: parameters close to those at `change`.
+        change: by the covariance; the end that is found is at most _WIDER times as far away.
+    """
+    others, last = tuple(name for name in fitted.names if name != p.name), dict(near)
+    most = _WIDER * abs(change)
+    for _ in range(_TRIES):
+        last |= {p.name: float(p.moved(fitted.parameters[p.name], change))}
+        try:
+            at_end = _refit(fitted, last, others, used)
+        except (UnsolvedError, InputError):
+            break
+        rise, last = at_end.deviance - fitted.deviance, dict(at_end.parameters)
+        step = math.sqrt(expected / np.clip(rise, _FLAT**2 * expected, _STEEP**4 * expected))
+        change = math.copysign(min(abs(change) * step, most), change)
+        if _FLAT * expected < rise < _STEEP * expected:
+            break
+    return change
+
+
+def beyond_its_ends(fitted: Fit, used: Flags) -> Fit:
+    """Look for a lower minimum where coefficients are at both ends of what the runs determine worst.
+
+    A bent valley may have several, of which a search finds the nearest.
+    """
+    coefficients = {p.name for p in fitted.model.coefficients}
+    places = [i for i, p in enumerate(fitted.fitted) if p.name in coefficients and not fitted.held[i]]
+    for _ in range(_TRIES if places else 0):
+        values, vectors = np.linalg.eigh(fitted.covariance[np.ix_(places, places)])
+        along = fitted.covariance[:, places] @ vectors[:, -1] / values[-1]
+        half = float(stdtrit(fitted.freedom[places].min(), 0.975)) * math.sqrt(values[-1])
+        worst = fitted.names[places[int(np.argmax(np.abs(vectors[:, -1])))]]
+        others = tuple(name for name in fitted.names if name != worst)
+        ends = [apply_step(fitted.fitted, fitted.parameters, side * half * along) for side in (-1, 1)]
+        again = []
+        for end in ends:
+            with suppress(UnsolvedError, InputError):  # the model breaks down there
+                if _lower(fitted, end, used):
+                    again.append(_refit(fitted, _refit(fitted, end, others, used).parameters, fitted.names, used))
+        best = min(again, key=lambda one: one.deviance, default=fitted)
+        if best.deviance > fitted.deviance - _SMALL:
+            break
+        fitted = best
+    return fitted
+
+
+def _refit(fitted: Fit, start: Parameters, names: tuple[str, ...], rows: Flags) -> Fit:
+    """Fit some of the parameters to the runs in `rows` (n,) in the same S."""
+    estimated, numbers = (fitted.noise.run_covariance, fitted.repeats), fitted.wrong_numbers
+    return fit(fitted.model, start, names, rows, wrong_numbers=numbers, estimated=estimated, title="")
+
+
+def _lower(fitted: Fit, parameters: Parameters, used: Flags) -> bool:
+    """Tell whether one linear step from other parameters leads below a fit."""
+    data, every = fitted.model.runs, list(range(len(fitted.names)))
+    (prediction,) = fitted.model.predict([parameters])
+    there = replace(fitted, parameters=dict(parameters), prediction=prediction)
+    return _deviance(there, data, used, every) < _deviance(fitted, data, used, every)
 
 
 def profile_end(

@@ -32,7 +32,7 @@ from typing import NamedTuple
 import numpy as np
 
 from calibration.linear.gls import Groups, Noise, inverse_root
-from calibration.statistics.fit import Fit, fit
+from calibration.statistics.fit import Fit, beyond_its_ends, fit
 from calibration.statistics.statistical_model import with_runs
 from calibration.statistics.study import Study
 from calibration.table.excluded import listed
@@ -175,6 +175,8 @@ def fit_weighted(study: Study, start: Mapping[str, float]) -> tuple[Study, Fit]:
     names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
     title = "fit" if study.progress else ""
     fitted = fit(model, start, names, used, title=title)
+    if getattr(model, "rough", None):
+        fitted = beyond_its_ends(fitted, used)
     for _ in range(_ROUNDS if model.runs.known_covariance is None else 0):
         residual, condition = model.runs.y - fitted.prediction, model.runs.condition
         noise = estimate(residual[used], condition[used])

@@ -213,9 +213,9 @@ def _rivals(study: Study, attribution: Attribution, laws: Description | None) ->
 def _both_intervals(study: Study, attribution: Attribution) -> tuple[Intervals, Intervals]:
     """Compute the 95 % intervals of the calibrated model, and of the final one."""
     title = "intervals" if study.progress else ""
-    base = final = _intervals(attribution.base, study.split.fitted, title)
-    if attribution.final is not attribution.base:
-        final = _intervals(attribution.final, study.split.fitted, title)
+    final = base = _intervals(attribution.final, study.split.fitted, title)
+    if attribution.final is not attribution.base:  # what an effect is missing from has no use for exact intervals
+        base = _intervals(attribution.base, study.split.fitted, title, in_valleys=False)
     b = birge(study.model.runs, attribution.final, study.split.fitted)
     for effect in (e for e in study.model.effects if e.name in final):
         low, high = final[effect.name]
@@ -256,11 +256,11 @@ def first_fit(model: Experiment, held_out: Flags | None = None, **settings: Any)
     return *fit_weighted(study, model.guess(start, study.split.fitted)), given
 
 
-def _intervals(fitted: Fit, used: Flags, title: str) -> Intervals:
+def _intervals(fitted: Fit, used: Flags, title: str, *, in_valleys: bool = True) -> Intervals:
     """Compute 95 % intervals by profile deviance; by the covariance where the model breaks down at their ends."""
     try:
         if not skipped("intervals by profile deviance", 2 * len(fitted.names)):
-            return profile_intervals(fitted.model, fitted, used, title=title)
+            return profile_intervals(fitted.model, fitted, used, in_valleys=in_valleys, title=title)
     except InputError:
         pass
     return {name: fitted.interval(name) for name in fitted.names}

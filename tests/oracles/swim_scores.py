@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from calibration.statistics.fit import fit
+from calibration.statistics.fit import beyond_its_ends, fit
 from calibration.statistics.statistical_model import start_values
 from calibration.swim.course import Vehicles
 from calibration.swim.measured_swim import read_swims
@@ -52,7 +52,8 @@ class SwimScores:
         names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
         runs = replace(model.runs, y=model.predict([{**start, name: value}])[0])
         without = replace(model, runs=runs, sight=replace(model.sight, runs=runs))
-        return math.sqrt(max(fit(without, start, names, self.used, title="").deviance, 0.0))
+        lowest = beyond_its_ends(fit(without, start, names, self.used, title=""), self.used)
+        return math.sqrt(max(lowest.deviance, 0.0))
 
     def sized(self, name: str, side: int, strength: float) -> Robot | None:
         """Return the robot with an effect at λ = `strength` on one side of its null, if that is plausible.
