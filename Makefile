@@ -39,6 +39,7 @@ $(STAMP): pyproject.toml constraints.txt | $(VENV)/bin/uv
 	$(INSTALL) -e '.[dev]'
 	$(RUN) -m sim compile
 	$(RUN) -m planner compile
+	$(RUN) -m calibration compile
 	touch $@
 $(VENV)/bin/uv: constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -65,7 +66,7 @@ quick: $(STAMP) ## run the quick tests
 
 constraints: $(VENV)/bin/uv ## pin what pyproject.toml needs, with hashes (UPGRADE=1: the newest versions)
 	$(RUN) -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["build-system"]["requires"])' \
-	| $(UV) pip compile --quiet pyproject.toml - --extra dev --extra clusters --extra docs --extra page --extra hdf5 --extra gym --extra camera --extra dxf --extra boards --universal --generate-hashes \
+	| $(UV) pip compile --quiet pyproject.toml - --extra dev --extra clusters --extra docs --extra page --extra hdf5 --extra gym --extra camera --extra dxf --extra boards --extra peers --universal --generate-hashes \
 	--no-annotate --custom-compile-command 'make constraints' $(if $(UPGRADE),--upgrade) -o constraints.txt
 
 lint: $(STAMP) ## style, types; prints the lines of each package

@@ -1,4 +1,4 @@
-"""Command line of the calibration: `decide`, `simulate`, `tracks`."""
+"""Command line of the calibration: `compile`, `decide`, `simulate`, `tracks`."""
 
 from __future__ import annotations
 
@@ -11,6 +11,23 @@ from common.reading import refuse_missing
 
 program = Program("calibration", "find from measured runs what the model of a robot lacks, and correct it")
 main = program.main
+
+
+@program.command("compile")
+def _compile() -> None:
+    """Compile the loops of swims now rather than on first use."""
+    from time import perf_counter
+
+    import numpy as np
+
+    from calibration.swim.pose_noise import PoseNoise, Sizes
+    from sim import jit
+
+    jit.beforehand, began = True, perf_counter()
+    still, one = np.zeros(2, dtype=int), np.ones(2)
+    noise = PoseNoise(still, np.arange(2.0), still, np.zeros((2, 2)), Sizes(one, one, one, 1.0))
+    noise.whiten(np.zeros((2, 3)))
+    print(f"loops compiled in {perf_counter() - began:.0f} s -> {jit.CACHE}")
 
 
 @program.command("decide", of="calibration.api:decide")

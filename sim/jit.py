@@ -162,7 +162,7 @@ def _numba() -> Any:
         def on_start(self, event: Any) -> None:
             if event.data["dispatcher"].py_func in _functions:
                 if not beforehand:
-                    _say_first_use()
+                    _say_first_use(event.data["dispatcher"].py_func.__module__.partition(".")[0])
                 self.levels.append(config.OPT)
                 config.OPT = type(config.OPT)(_LEVEL)
 
@@ -177,6 +177,7 @@ def _numba() -> Any:
 
 
 @cache
-def _say_first_use() -> None:
-    words = "compiling loops for first use; softflagella sim compile does so beforehand"
+def _say_first_use(package: str) -> None:
+    by = {"surrogate": "planner", "planner": "planner", "calibration": "calibration"}.get(package, "sim")
+    words = f"compiling loops for first use; softflagella {by} compile does so beforehand"
     print(words, file=sys.stderr, flush=True)

@@ -47,6 +47,7 @@ SAID = {  # by commands that write nothing
     "sim effects": "end_over_end_drag           5 8π μ0 R³  ",
     "sim compile": "loops compiled in",
     "planner compile": "loops compiled in",
+    "calibration compile": "loops compiled in",
 }
 COMMANDS = [(package, name) for package in COMMANDED for name in program_of(package).commands]
 COMMANDS.append(("softflagella", "calibrate"))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +11,7 @@ import pytest
 
 from calibration.swim.pose_noise import PoseNoise, Sizes, estimate_noise
 from common.arrays import Floats
+from tests.processes import LIMIT, ROOT
 
 SIZES = Sizes(np.array([0.03, 0.01]), np.array([0.05, 0.02]), np.array([0.01, 0.03]), 10.0)
 
@@ -87,3 +90,21 @@ def test_the_sizes_are_found_again() -> None:
         found.append(np.concatenate([*estimate_noise(rough, drawn, columns).sizes[:3]]))
     truth = np.concatenate(SIZES[:3])
     assert np.abs(np.log(np.array(found) / truth).mean(0)).max() < 0.15
+
+
+_COMPILED = """
+from calibration.__main__ import main
+from calibration.swim import pose_noise as swim
+from tests.calibration.swim.test_pose_noise import SIZES, noise_of
+main(["compile"])
+before = [loop.kernel.signatures[:] for loop in (swim._gains, swim._filtered)]
+noise = noise_of(60, SIZES, first=40)
+noise.colour(noise.whiten(swim.np.ones((60, 3, 4))))
+assert all(before) and [loop.kernel.signatures for loop in (swim._gains, swim._filtered)] == before
+"""
+
+
+def test_a_swim_needs_no_loops_but_those_that_are_compiled_beforehand() -> None:
+    command = [sys.executable, "-c", _COMPILED]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=LIMIT)
+    assert done.returncode == 0, done.stderr
