@@ -46,15 +46,19 @@ def falls(
     return table.assign(v=v * np.exp(shift[place] + NOISE * rng.standard_normal(len(table))))
 
 
-def model_of(
-    table: pd.DataFrame, effects: Sequence[str] = ("wall", "surface", "late"), **roles: Any
-) -> FunctionModel:
-    """Make the model of a table, with some effects in its catalogue."""
-    model = sf.Model(
+def declared(effects: Sequence[str] = ("wall", "surface", "late")) -> sf.Model:
+    """Declare the model, with some effects in its catalogue."""
+    return sf.Model(
         fall,
         outputs={"v": sf.Output("speed", unit="mm/s")},
         numbers=[sf.Number("viscosity", 1.0, unit="Pa s", low=0.01, high=100)],
         effects=[effect for effect in EFFECTS if effect.name in effects],
         settings=["d"],
     )
-    return read_runs_of(table, model, Roles(**({"session": "round"} | roles)))[0]
+
+
+def model_of(
+    table: pd.DataFrame, effects: Sequence[str] = ("wall", "surface", "late"), **roles: Any
+) -> FunctionModel:
+    """Make the model of a table, with some effects in its catalogue."""
+    return read_runs_of(table, declared(effects), Roles(**({"session": "round"} | roles)))[0]
