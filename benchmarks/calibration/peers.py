@@ -14,217 +14,41 @@ Takes 20 minutes.
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from functools import partial
 from importlib.util import find_spec
-from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy.stats import f as f_distribution
 from threadpoolctl import threadpool_limits
 
 import softflagella as sf
 from benchmarks.calibration.forms import PLANTED, FormsCase, length
 from benchmarks.common import heading, in_parallel, per_cent, row
 from calibration.own_model.model_file import load_model
-from common.arrays import Floats
 from tests.oracles.drawn_falls import EFFECTS, declared, falls
-from tests.oracles.drawn_traces import AIR, FAMILIES, Design, draw_traces, model_of_traces, size_at
+from tests.oracles.drawn_traces import FAMILIES, Design, draw_traces, model_of_traces, size_at
 from tests.oracles.others import MODELS, SETS
+from tests.oracles.peers import (
+    LEAST_SQUARES,
+    MIXED,
+    NEEDS,
+    Finding,
+    Measured,
+    by_least_squares,
+    by_mixed_model,
+    by_sindy,
+)
 
-LOOP, MIXED, SINDY = "this loop", "mixed model, BIC", "pysindy"
-_CRITERIA = ("BIC", "AICc", "F-tests")
-_LEVELS = {"": False, ", a level a session": True}
-LEAST_SQUARES = tuple(f"{criterion}{levels}" for criterion in _CRITERIA for levels in _LEVELS)
-NEEDS = {**dict.fromkeys(LEAST_SQUARES, "lmfit"), MIXED: "statsmodels", SINDY: "pysindy"}
-_ALPHA, _TAIL = 0.01, 1.959964  # level of the F-tests; of a 95 % interval
-_STEP = 1e-4  # of derivatives, in typical sizes
-
-
-class Answer(NamedTuple):
-    """What a method says of a table."""
-
-    named: frozenset[str]  # effects
-    intervals: Mapping[str, tuple[float, float]]  # 95 %, of numbers that all rows share
+LOOP = "this loop"
 
 
-@dataclass(frozen=True)
-class Measured:
-    """A table as least squares have it."""
-
-    model: sf.Model
-    columns: Mapping[str, Any]  # (n,) each
-    parts: Sequence[Any]  # rows of each trace, or of all
-    session: Floats  # (n,) numbers from 0
-    own: tuple[str, ...]  # numbers that each part has of its own
-
-    @classmethod
-    def of(cls, model: sf.Model, table: pd.DataFrame, session: str | None, trace: str | None) -> Measured:
-        """Read a table whose columns are those that the model asks for."""
-        columns = {str(name): table[name].to_numpy() for name in table}
-        parts = [np.arange(len(table))] if trace is None else [
-            np.flatnonzero(columns[trace] == name) for name in dict.fromkeys(columns[trace])
-        ]  # fmt: skip
-        codes = (
-            np.zeros(len(table))
-            if session is None
-            else np.unique(columns[session], return_inverse=True)[1].astype(float)
-        )
-        return cls(model, columns, parts, codes, tuple(n.name for n in model.numbers if n.per == "trace"))
-
-    def scaled(self, output: str, values: Any) -> Floats:
-        """Return an output on the scale on which it is fitted."""
-        return np.log(values) if self.model.outputs[output].kind == "ratio" else np.asarray(values, dtype=float)
-
-    @property
-    def y(self) -> Floats:
-        """What was measured, (k n,)."""
-        return np.concatenate([self.scaled(o, self.columns[o]) for o in self.model.outputs])
-
-    def predict(self, p: Mapping[str, float]) -> Floats:
-        """Compute all outputs (k n,) of numbers by name; those of a part have its place behind their name."""
-        result = {output: np.empty(len(self.session)) for output in self.model.outputs}
-        for place, rows in enumerate(self.parts):
-            of_part = {**p, **{name: p[f"{name}_{place}"] for name in self.own}}
-            seen = self.model.function({name: of[rows] for name, of in self.columns.items()}, of_part)
-            for output, values in seen.items():
-                result[output][rows] = self.scaled(output, values)
-        return np.concatenate([result[output] for output in self.model.outputs])
-
-    def start(self) -> dict[str, Any]:
-        """List the parameters of all numbers: name -> as declared."""
-        found: dict[str, Any] = {}
-        for number in self.model.numbers:
-            places = range(len(self.parts)) if number.name in self.own else [None]
-            found |= {number.name if k is None else f"{number.name}_{k}": number.parameter for k in places}
-        return found
-
-
-def least_squares(table: Measured, effects: Sequence[str], *, levels: bool) -> Any:
-    """Fit numbers, some effects and, if wanted, a level for each session; return the result of lmfit."""
-    import lmfit
-
-    parameters, catalogue = lmfit.Parameters(), {e.name: e.parameter for e in table.model.effects}
-    for name, p in {**table.start(), **catalogue}.items():
-        start = p.start + (0.2 * p.typical if name in effects else 0.0)
-        parameters.add(name, float(np.clip(start, *p.bounds)), min=p.bounds[0], max=p.bounds[1],
-                       vary=name not in catalogue or name in effects)  # fmt: skip
-    sessions = np.unique(table.session)[1:] if levels else np.empty(0)
-    for of in sessions:
-        parameters.add(f"level_{of:.0f}", 0.0)
-    y, outputs = table.y, len(table.model.outputs)
-    which = [np.tile(table.session == of, outputs) for of in sessions]
-
-    def residual(p: Any) -> Floats:
-        values = p.valuesdict()
-        shift = sum(
-            (values[f"level_{of:.0f}"] * rows for of, rows in zip(sessions, which, strict=True)), np.zeros(1)
-        )
-        left = y - table.predict(values) - shift
-        return np.nan_to_num(left, nan=1e3, posinf=1e3, neginf=-1e3)
-
-    return lmfit.minimize(residual, parameters, method="leastsq", max_nfev=2000)
-
-
-def _sets(table: Measured) -> Iterator[tuple[str, ...]]:
-    """List no effect, each, and each pair."""
-    names = [effect.name for effect in table.model.effects]
-    return (some for count in range(3) for some in combinations(names, count))
-
-
-def _intervals(table: Measured, fitted: Any) -> dict[str, tuple[float, float]]:
-    shared = [number.name for number in table.model.numbers if number.name not in table.own]
-    found = {name: (fitted.params[name].value, fitted.params[name].stderr) for name in shared}
-    return {n: (v - _TAIL * s, v + _TAIL * s) for n, (v, s) in found.items() if s is not None}
-
-
-def by_least_squares(table: Measured) -> dict[str, Answer]:
-    """Choose among all fits by each criterion."""
-    answers: dict[str, Answer] = {}
-    for words, levels in _LEVELS.items():
-        fits = {some: least_squares(table, some, levels=levels) for some in _sets(table)}
-
-        def corrected(fit: Any) -> float:
-            k = fit.nvarys + 1
-            return float(fit.aic + 2 + 2 * k * (k + 1) / max(fit.ndata - k - 1, 1))
-
-        chosen = {
-            "BIC": min(fits, key=lambda some: fits[some].bic),
-            "AICc": min(fits, key=lambda some: corrected(fits[some])),
-            "F-tests": _forwards(fits),
-        }
-        answers |= {
-            f"{how}{words}": Answer(frozenset(some), _intervals(table, fits[some])) for how, some in chosen.items()
-        }
-    return answers
-
-
-def _forwards(fits: Mapping[tuple[str, ...], Any]) -> tuple[str, ...]:
-    """Add the effect that lowers the residual most, as long as its F-test is significant."""
-    here: tuple[str, ...] = ()
-    while wider := [some for some in fits if len(some) == len(here) + 1 and set(here) <= set(some)]:
-        best = min(wider, key=lambda some: fits[some].chisqr)
-        freedom = fits[best].ndata - fits[best].nvarys
-        ratio = (fits[here].chisqr - fits[best].chisqr) / (fits[best].chisqr / freedom)
-        if f_distribution.sf(max(ratio, 0.0), 1, freedom) > _ALPHA / len(wider):
-            break
-        here = best
-    return here
-
-
-def by_mixed_model(table: Measured) -> dict[str, Answer]:
-    """Choose by BIC among mixed models that are linear near the fit without effects."""
-    from statsmodels.regression.mixed_linear_model import MixedLM
-
-    base = least_squares(table, (), levels=False).params.valuesdict()
-    steps = {
-        **{n: (abs(base[n]) or 1.0) for n in table.start()},
-        **{e.name: e.parameter.typical for e in table.model.effects},
-    }
-    at = table.predict(base)
-    slopes = {n: (table.predict({**base, n: base[n] + _STEP * s}) - at) / _STEP for n, s in steps.items()}
-    groups, fits = np.tile(table.session, len(table.model.outputs)), {}
-    numbers = list(table.start())
-    for some in _sets(table):
-        columns = np.column_stack([slopes[name] for name in (*numbers, *some)])
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            fits[some] = MixedLM(table.y - at, columns, groups).fit(reml=False)
-    k = len(numbers) + 2
-    chosen = min(fits, key=lambda some: (k + len(some)) * np.log(len(at)) - 2 * fits[some].llf)
-    fitted, found = fits[chosen], {}
-    for place, name in enumerate(numbers):
-        change, error = (steps[name] * float(each[place]) for each in (fitted.fe_params, fitted.bse_fe))
-        found[name] = (base[name] + change - _TAIL * error, base[name] + change + _TAIL * error)
-    return {MIXED: Answer(frozenset(chosen), found)}
-
-
-def by_sindy(table: Measured) -> dict[str, Answer]:
-    """Name the terms of the rate of cooling that sequential thresholding keeps."""
-    import pysindy
-
-    excess = [table.columns["T"][rows][:, None] - AIR for rows in table.parts]
-    times = [table.columns["t_s"][rows] for rows in table.parts]
-    # In units of 50 K and of the time constant, so that one threshold suits all terms.
-    search = pysindy.SINDy(
-        optimizer=pysindy.STLSQ(threshold=0.05), feature_library=pysindy.PolynomialLibrary(degree=3),
-        differentiation_method=pysindy.SmoothedFiniteDifference(),
-    )  # fmt: skip
-    search.fit([each / 50 for each in excess], t=[each / 900 for each in times])
-    kept = np.abs(search.coefficients()[0]) > 0
-    terms = dict(zip(("warming", "", "radiation", "evaporation"), kept, strict=True))
-    return {SINDY: Answer(frozenset(name for name, there in terms.items() if name and there), {})}
-
-
-def by_loop(model: sf.Model, table: pd.DataFrame, **roles: Any) -> dict[str, Answer]:
+def by_loop(model: sf.Model, table: pd.DataFrame, **roles: Any) -> dict[str, Finding]:
     """Ask the loop."""
     verdict = sf.calibrate(table, model, progress=False, **roles)
     sets = [claim.added for claim in (*verdict.claims, *verdict.attribution.rival_effects)]
-    return {LOOP: Answer(frozenset(e.name for added in sets for e in added), verdict.final_intervals)}
+    return {LOOP: Finding(frozenset(e.name for added in sets for e in added), verdict.final_intervals)}
 
 
 class Case(NamedTuple):
@@ -272,7 +96,7 @@ CASES = (
 )
 
 
-def answers_of(model: sf.Model, table: pd.DataFrame, roles: Mapping[str, str]) -> dict[str, Answer]:
+def answers_of(model: sf.Model, table: pd.DataFrame, roles: Mapping[str, str]) -> dict[str, Finding]:
     """Ask every method that is installed and applies."""
     measured = Measured.of(model, table, roles.get("session"), roles.get("trace"))
     answers = by_loop(model, table, **roles)
