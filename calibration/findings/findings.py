@@ -29,6 +29,7 @@ from calibration.table.runs import Runs
 from common.arrays import Floats
 
 _HALF = 0.5  # of an error on left-out runs
+_SHORT = 30  # letters of what is added to a model, in the model's name
 
 
 class Description(Protocol):
@@ -175,7 +176,9 @@ class Findings:
             free = " and ".join(of.title for of in self.attribution.explanations[0].added)
             named["after"] = f"refitted, {free} free"
         elif adopted := self.nearest or next(iter(self.claims), None):
-            named["after"] = f"refitted with {' and '.join(of.title for of in adopted.added)}"
+            title, several = " and ".join(of.title for of in adopted.added), len(adopted.added) > 1
+            short = title if len(title) <= _SHORT else "the effects" if several else "the effect"
+            named["after"] = f"refitted with {short}"
         return named | {"law": "refitted with the best law"} if "law" in self.errors.rms else named
 
     @property

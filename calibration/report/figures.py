@@ -350,8 +350,8 @@ def _ranked(result: Findings, residual: Floats) -> list[tuple[Flags, str]]:
     order = np.argsort(errors)
     places = {int(order[0]): "least error", int(order[len(order) // 2]): "median", int(order[-1]): "largest error"}
     words = places if len(traces) > 1 else {0: ""}
-    return [(trace == traces[i], f"{data.trace_names[traces[i]]}{f', {rank}' if rank else ''}")
-            for i, rank in words.items()]  # fmt: skip
+    names = [f"trace {name}" if name.isdigit() else name for name in data.trace_names]
+    return [(trace == traces[i], f"{names[traces[i]]}{f', {rank}' if rank else ''}") for i, rank in words.items()]
 
 
 def _draw_residual(residual: Floats, limits: Floats, used: Flags, data: Runs) -> Figure:

@@ -31,7 +31,8 @@ _KINDS = {
 def headline(record: Record) -> str:
     """Say the verdict in one sentence, with the size of what it names."""
     for named in range(_NAMED, 0, -1):
-        said = _one_line(rendered("headline.j2", {**record, "named": named}))
+        context = {**record, "named": named, "unconfirmed": _unconfirmed(record)}
+        said = _one_line(rendered("headline.j2", context))
         if len(said.split()) <= _LONGEST:
             break
     return said
@@ -43,10 +44,8 @@ def badges(record: Record) -> list[str]:
     kind = "description only" if described else _KINDS[record["verdict"]]
     if record["verdict"] == "none" and record["moves"]:
         kind = "claimed"
-    explained = record["verdict"] not in ("partial", "unexplained")
-    refuted = record["held_out_error_falls"] is False or record["gain_is_certain"] is False
     doubted = record["imitable"] or (record["number_check"] or {}).get("uncertain")
-    unconfirmed = refuted or (explained and not record["held_out_runs_agree"])
+    unconfirmed = _unconfirmed(record)
     found = {
         kind: (record["noise_known"] or record["verdict"] != "none") and not (kind == "claimed" and unconfirmed),
         "noise unknown": not record["noise_known"],
@@ -55,6 +54,13 @@ def badges(record: Record) -> list[str]:
         "look-alikes possible": doubted,
     }
     return [words for words, holds in found.items() if holds]
+
+
+def _unconfirmed(record: Record) -> bool:
+    """Tell whether the held-out runs do not bear out a verdict."""
+    explained = record["verdict"] not in ("partial", "unexplained")
+    refuted = record["held_out_error_falls"] is False or record["gain_is_certain"] is False
+    return refuted or (explained and not record["held_out_runs_agree"])
 
 
 def in_brief(record: Record) -> list[str]:

@@ -215,7 +215,9 @@ def test_the_example_runs_from_the_command_to_the_report(
     assert run_command(main, next_command.split()[1:]) == 0
     printed = capsys.readouterr().out.splitlines()
     assert len(printed) <= 8
-    missing = r"Missing: wall of the tube, [\d.]+ times the size of theory \([\d.]+ to [\d.]+\)\. \[claimed.*\]"
+    missing = (
+        r"Missing: wall of the tube, [\d.]+ times the size of theory \(95 %: [\d.]+ to [\d.]+\)\. \[claimed.*\]"
+    )
     assert re.fullmatch(missing, printed[0])
     assert printed[1].startswith("error on the held-out runs: refitted ")
     assert json.loads(Path("falls/corrected.json").read_text())["effects"]["wall"]["value"] == pytest.approx(

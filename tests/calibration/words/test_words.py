@@ -127,7 +127,9 @@ def test_rivals_are_told_apart_by_runs_that_are_worth_making_and_a_command() -> 
     (place,) = (i for i, step in enumerate(next_steps(often)) if step.startswith("Make the 8 runs listed under"))
     assert "`softflagella calibration decide " in next_steps(often)[place + 1]
     assert next_steps(seldom)[place].startswith("Make more runs")
-    assert next_steps(seldom)[place + 1].startswith("Do not make runs with these settings")
+    assert next_steps(seldom)[place + 1].startswith(
+        "More runs with these settings hardly tell the explanations apart"
+    )
     assert "decide in 14 % of cases only" in next_steps(seldom)[place + 1]
     assert "Runs to make next" not in in_report(seldom)
     assert "Single settings" not in in_report(seldom)
@@ -141,9 +143,9 @@ def test_rivals_are_told_apart_by_runs_that_are_worth_making_and_a_command() -> 
 @pytest.mark.parametrize(
     ("robot", "path_decides", "decides", "said"),
     [
-        ("as given", 0.7, 0.7, "Let the robot swim as this command plans: `softflagella plan circle:2l`."),
+        ("as given", 0.7, 0.7, "Let the robot swim circle:2l, as this command plans: `softflagella plan circle:2l`."),
         ("tails.count=3", 0.02, 0.9, "the best one, circle:2l, decides in 2 % of cases. Let another robot, with "
-         "`tails.count=3`, swim as this command plans: `softflagella plan square:2l`."),
+         "`tails.count=3`, swim square:2l, as this command plans: `softflagella plan square:2l`."),
         ("tails.count=3", 0.6, 0.9, "Let another robot, with `tails.count=3`, swim"),
         ("tails.count=3", 0.02, 0.1, "Do not let the robot swim again"),
     ],
