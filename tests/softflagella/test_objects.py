@@ -88,7 +88,7 @@ def test_a_plan_says_what_it_holds() -> None:
 def test_a_goal_plan_says_where_it_ends() -> None:
     goal, text = made("goal"), repr(made("goal"))
     assert number(r"passes at a distance of # cm", text) == pytest.approx(CM * goal.kept_clear.clearance, rel=0.01)
-    assert number(r"margin # cm", text) == pytest.approx(CM * goal.kept_clear.margin, rel=0.01)
+    assert number(r"margin of # cm", text) == pytest.approx(CM * goal.kept_clear.margin, rel=0.01)
     assert number(r"way of # cm", text) == pytest.approx(CM * goal.job.length, rel=0.01)
     assert goal.job.to_dict(goal)["keep_out"] == [{"circle": [1.2, -1.5, 0.3]}]
 

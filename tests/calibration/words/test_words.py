@@ -143,7 +143,8 @@ def test_rivals_are_told_apart_by_runs_that_are_worth_making_and_a_command() -> 
 @pytest.mark.parametrize(
     ("robot", "path_decides", "decides", "said"),
     [
-        ("as given", 0.7, 0.7, "Let the robot swim circle:2l, as this command plans: `softflagella plan circle:2l`."),
+        ("as given", 0.7, 0.7,
+         "Let the robot swim circle:2l, as this command plans: `softflagella plan circle:2l`."),
         ("tails.count=3", 0.02, 0.9, "the best one, circle:2l, decides in 2 % of cases. Let another robot, with "
          "`tails.count=3`, swim square:2l, as this command plans: `softflagella plan square:2l`."),
         ("tails.count=3", 0.6, 0.9, "Let another robot, with `tails.count=3`, swim"),
