@@ -46,7 +46,7 @@ def scores(
         misfit: of the fit, if it is at hand.
     """
     rough = getattr(study.model, "rough", None)
-    if rough is None or fitted.converged:
+    if rough is None or not fitted.far:
         return misfit or examine_residual(study, fitted, tangents), fitted
     used, wrong = study.split.fitted, fitted.wrong_numbers
     near = fit(rough, fitted.parameters, fitted.names, used, wrong_numbers=wrong, title="")

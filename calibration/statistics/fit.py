@@ -176,6 +176,7 @@ class Fit:
     tested: tuple[Floats, Floats] = (np.empty(0), np.empty(0))  # changes of the nuisance parameters from their
     # values as given, and variances, by least squares in Σ, as tests have them; (p,)
     stopped: bool = False  # the search ended because no time was left
+    far: bool = False  # it leaves far more than noise, so it may have ended anywhere along a valley
 
     @property
     def tangents(self) -> Floats:
@@ -342,6 +343,7 @@ def fit(
         wrong_numbers=wrong_numbers,
         tested=(np.array(offsets) + step, np.diag(certain_where_held(spread, ahead.held, fitted))),
         stopped=stopped,
+        far=problem.above(point) > 0,
     )
 
 
