@@ -10,8 +10,11 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from calibration.attribution.effects import scores
 from calibration.statistics.fit import Fit, beyond_its_ends, fit, profile_intervals
+from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.statistical_model import Parameter, Parameters, Predict
+from calibration.statistics.study import Study
 from calibration.table.runs import Runs
 from common.arrays import Floats
 from tests.calibration.statistics.test_fit import NOISE, runs_of
@@ -34,6 +37,7 @@ class BentValley:
     prior: float = PRIOR
     nuisances: tuple[Parameter, ...] = ()
     effects: tuple[Parameter, ...] = ()
+    rough: BentValley | None = None
 
     @property
     def coefficients(self) -> tuple[Parameter, ...]:
@@ -111,3 +115,19 @@ def test_intervals_along_a_bent_valley_are_those_of_the_deviance_with_all_else_r
     ends = brentq(lambda a: deviance(a) - RISE, -8, 1), brentq(lambda a: deviance(a) - RISE, 1, 8)
     assert (low, high) == pytest.approx(ends, abs=0.1)
     assert fitted.interval("a") != pytest.approx(ends, abs=0.1)  # the covariance says something else
+
+
+@pytest.mark.parametrize("far", [False, True])
+def test_a_fit_is_scored_where_it_ended_unless_it_is_far_above_the_noise(far: bool) -> None:
+    """Where it is far, the rough model says what is missing; that a search has not converged is no reason."""
+    model = model_of(lambda a: 10 * (a - 1))
+    y = model.runs.y + far * 3 * NOISE * np.where(np.arange(COUNT) % 2, 1, -1)[:, None]
+    model = replace(model, runs=replace(model.runs, y=y))
+    model = replace(model, rough=model)
+    ended = replace(fitted_at(model, 1.2), converged=False)
+    assert ended.far is far
+    study, none = Study.fitted_to(model, ALL, draws=50), Directions.plain(np.empty((COUNT, 3, 0)))
+    of_the_fit = examine_residual(study, ended, none)
+    misfit, at = scores(study, ended, (), none, of_the_fit)
+    assert (at is ended) is not far
+    assert (misfit is of_the_fit) is not far
