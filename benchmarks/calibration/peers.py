@@ -29,7 +29,7 @@ from benchmarks.common import heading, in_parallel, per_cent, row
 from calibration.own_model.model_file import load_model
 from tests.oracles.drawn_falls import EFFECTS, declared, falls
 from tests.oracles.drawn_traces import FAMILIES, Design, draw_traces, model_of_traces, size_at
-from tests.oracles.others import MODELS, SETS
+from tests.oracles.others import MODELS, SETS, named
 from tests.oracles.peers import (
     LEAST_SQUARES,
     MIXED,
@@ -45,10 +45,13 @@ LOOP = "this loop"
 
 
 def by_loop(model: sf.Model, table: pd.DataFrame, **roles: Any) -> dict[str, Finding]:
-    """Ask the loop."""
+    """Ask the loop; a form that it adopts is no claim."""
     verdict = sf.calibrate(table, model, progress=False, **roles)
     sets = [claim.added for claim in (*verdict.claims, *verdict.attribution.rival_effects)]
-    return {LOOP: Finding(frozenset(e.name for added in sets for e in added), verdict.final_intervals)}
+    words = named(verdict.facts)
+    if verdict.nearest:
+        words = f"as a description: {words}"
+    return {LOOP: Finding(frozenset(e.name for added in sets for e in added), verdict.final_intervals, words)}
 
 
 class Case(NamedTuple):
@@ -137,7 +140,9 @@ def _of_published(name: str) -> tuple[str, dict[str, str]]:
     frame = table if isinstance(table, pd.DataFrame) else pd.read_csv(table)
     roles = {key: value for key in ("session", "specimen") if (value := getattr(SETS[name], key))}
     answers = answers_of(model, frame.dropna(), roles)
-    return name, {method: ", ".join(sorted(answer.named)) or "nothing" for method, answer in answers.items()}
+    return name, {
+        method: answer.words or ", ".join(sorted(answer.named)) or "nothing" for method, answer in answers.items()
+    }
 
 
 def draw(shares: Mapping[str, Mapping[str, float]], picture: str) -> None:

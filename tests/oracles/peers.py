@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any, NamedTuple
@@ -33,6 +34,7 @@ class Finding(NamedTuple):
 
     named: frozenset[str]  # effects
     intervals: Mapping[str, tuple[float, float]]  # 95 %, of numbers that all rows share
+    words: str = ""  # what is named, where that is not all
 
 
 @dataclass(frozen=True)
@@ -161,7 +163,7 @@ def forwards(fits: Mapping[tuple[str, ...], Any]) -> tuple[str, ...]:
 
 
 def by_mixed_model(table: Measured) -> dict[str, Finding]:
-    """Choose by BIC among mixed models that are linear near the fit without effects."""
+    """Choose by BIC among mixed models that are linear near the fit without effects; none if no fit succeeds."""
     from statsmodels.regression.mixed_linear_model import MixedLM
 
     base = least_squares(table, (), levels=False).params.valuesdict()
@@ -175,9 +177,12 @@ def by_mixed_model(table: Measured) -> dict[str, Finding]:
     numbers = list(table.start())
     for some in _sets(table):
         columns = np.column_stack([slopes[name] for name in (*numbers, *some)])
-        with warnings.catch_warnings():  # Powell's search: the default one diverges where levels hardly scatter
+        # Powell's search: the default one diverges where levels hardly scatter. Some fits have a singular matrix.
+        with warnings.catch_warnings(), suppress(np.linalg.LinAlgError):
             warnings.simplefilter("ignore")
             fits[some] = MixedLM(table.y - at, columns, groups).fit(reml=False, method="powell")
+    if not fits:
+        return {}
     k = len(numbers) + 2
     chosen = min(fits, key=lambda some: (k + len(some)) * np.log(len(at)) - 2 * fits[some].llf)
     fitted, found = fits[chosen], {}
