@@ -66,7 +66,7 @@ def held_out_errors(record: Record) -> tuple[list[str], dict[str, list[str]]]:
     named, final = record["models"], "law" if record["described"] else "after"
     shown_models = ("before", final) if final in named else ("uncalibrated", "before")
     models = {named[model]: model for model in shown_models}
-    noise = {f"noise of a {record['row']}": "noise"} if record["noise_known"] else {}
+    noise = {noise_of_a_row(record): "noise"} if record["noise_known"] else {}
     names = record["outputs"]
     if _shared_scale(record)[1] != _SEVERAL:
         errors = {words: [error_in_words(record, record[f"error_{model}"])] for words, model in models.items()}
@@ -79,6 +79,11 @@ def held_out_errors(record: Record) -> tuple[list[str], dict[str, list[str]]]:
         words: [output_error(record, each[model][name], name) for name in shown]
         for words, model in (models | noise).items()
     }
+
+
+def noise_of_a_row(record: Record) -> str:
+    """Say what noise a row has; random steps at the flips of a swim are part of it, and add up along the way."""
+    return "noise and random steps" if record["row"] == "pose" else f"noise of a {record['row']}"
 
 
 def _shared_scale(record: Record) -> tuple[float, str]:

@@ -134,6 +134,7 @@ def _environment() -> Environment:
     environment.filters |= _FILTERS | {name: pass_context(words) for name, words in _OF_OUTPUTS.items()}
     environment.globals |= {
         "held_out_errors": pass_context(quantities.held_out_errors),
+        "noise_of_a_row": pass_context(quantities.noise_of_a_row),
         "gain_in_words": pass_context(quantities.gain_in_words),
     }
     return environment
