@@ -97,6 +97,7 @@ _BENDS = 0.01  # departure from a linear model, in the variance of the noise
 _EXACT = 1e-12  # of a guessed variance: what runs without noise leave
 _PROFILE = 0.05  # share of a size to which an end of its interval is found
 _FLAT, _STEEP = 0.5, 2.0  # shares of the expected rise between which the deviance is a parabola
+_ROUNDS = 2  # of looking for a lower minimum
 _WIDER, _TRIES = 4.0, 4  # of an end in a bent valley: its distance over that by the covariance; fits
 
 
@@ -712,7 +713,7 @@ def beyond_its_ends(fitted: Fit, used: Flags) -> Fit:
     """
     coefficients = {p.name for p in fitted.model.coefficients}
     places = [i for i, p in enumerate(fitted.fitted) if p.name in coefficients and not fitted.held[i]]
-    for _ in range(_TRIES if places else 0):
+    for _ in range(_ROUNDS if places else 0):
         values, vectors = np.linalg.eigh(fitted.covariance[np.ix_(places, places)])
         along = fitted.covariance[:, places] @ vectors[:, -1] / values[-1]
         half = float(stdtrit(fitted.freedom[places].min(), 0.975)) * math.sqrt(values[-1])

@@ -46,14 +46,16 @@ class SwimScores:
         self.model = SwimModel(inner, Sight(runs), runs, Vehicles.of(swims, self.truth.time_scale))
         self.used = ~runs.left_out(held_out)
 
-    def strength(self, name: str, value: float) -> float:
-        """Compute λ of an effect of some value."""
+    def strength(self, name: str, value: float, *, lowest: bool = True) -> float:
+        """Compute λ of an effect of some value; of the `lowest` minimum, or of the first that a search finds."""
         start, model = start_values(self.model), self.model
         names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
         runs = replace(model.runs, y=model.predict([{**start, name: value}])[0])
         without = replace(model, runs=runs, sight=replace(model.sight, runs=runs))
-        lowest = beyond_its_ends(fit(without, start, names, self.used, title=""), self.used)
-        return math.sqrt(max(lowest.deviance, 0.0))
+        fitted = fit(without, start, names, self.used, title="")
+        if lowest:
+            fitted = beyond_its_ends(fitted, self.used)
+        return math.sqrt(max(fitted.deviance, 0.0))
 
     def sized(self, name: str, side: int, strength: float) -> Robot | None:
         """Return the robot with an effect at λ = `strength` on one side of its null, if that is plausible.
@@ -67,7 +69,9 @@ class SwimScores:
         for _ in range(_TRIES):
             if not low <= effect.start + size <= high:
                 return None
-            level = self.strength(name, effect.start + size)
+            level = self.strength(name, effect.start + size, lowest=False)
+            if abs(level / strength - 1) < _CLOSE:
+                level = self.strength(name, effect.start + size)
             if abs(level / strength - 1) < _CLOSE:
                 return with_influence(self.truth, name, effect.start + size)
             size *= min(strength / max(level, 1e-3), 10.0)
