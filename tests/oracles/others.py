@@ -102,6 +102,7 @@ def named(record: dict[str, Any]) -> str:
     if not found:
         return "nothing"
     forms = [form["title"] for form in record["forms"]]
-    best = next((title for title in forms if record["nearest"]["at_theory"] and "theory" in title), found[-1])
+    at_theory = record["nearest"] and record["nearest"]["at_theory"]
+    best = next((title for title in forms if at_theory and "theory" in title), found[-1])
     others = [title for title in forms if title != best]
     return ", then ".join((*found[:-1], best)) + (f" (or {', '.join(others)})" if others else "")
