@@ -89,9 +89,7 @@ _ON_BOUND = 1e-9  # distance in typical sizes
 _BLIND = 1e-12  # share of the largest eigenvalue below which a combination of parameters shows nothing
 _NEARLY_CERTAIN = 1e-6  # standard deviation of a parameter that is held, in typical sizes
 _KEPT = 0.25  # share of the promised fall below which the next step is damped
-_UNSETTLED = (
-    1.0  # a fit has not converged if one more step is expected to reduce rᵀ Σ⁻¹ r by more, over that of noise
-)
+_UNSETTLED = 1.0  # a fit has not converged if one more step is expected to reduce it by more, over that of noise
 _ROUGH, _IDLE = 4.0, 8  # the same, where so many steps gained less than _UNSETTLED, since the model is rough
 _BENDS = 0.01  # departure from a linear model, in the variance of the noise
 _EXACT = 1e-12  # of a guessed variance: what runs without noise leave
@@ -551,8 +549,8 @@ def _descend(problem: _Problem, point: _Point, search: _Search) -> tuple[_Point,
             least, refused = max(step.damping + 1 + refused, 2), True  # each costs as much as one that does
             if least >= len(_DAMPING):
                 break
-    idle = solved and len(reached) > _IDLE and reached[-_IDLE] - reached[-1] < _UNSETTLED
-    return point, session_ratio, idle
+    gained = reached[-_IDLE] - reached[-1] if len(reached) > _IDLE else math.inf
+    return point, session_ratio, solved and gained < _UNSETTLED * problem.noise_level(normal)
 
 
 def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: Floats, least: int) -> _FitStep:
