@@ -14,6 +14,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from benchmarks.common import heading, in_parallel, per_cent, row
 from calibration.statistics.residual_tests import directions, examine_residual
@@ -69,13 +70,18 @@ def length(name: str, case: FormsCase) -> float:
     return float(misfit.scores.length[[effect.name for effect in model.effects].index(name)])
 
 
-def said(case: FormsCase, seed: int) -> Said:
-    """Draw a table, and say what its verdict is worth."""
+def drawn(case: FormsCase, seed: int) -> tuple[pd.DataFrame, list[str], str]:
+    """Draw a table; return it, the names of the catalogue, and that of the effect which is planted, if any is."""
     truth = PLANTED[seed % len(PLANTED)]
     size = np.random.default_rng(seed).uniform(*case.strength) / length(truth, case) if case.strength[1] else 0.0
     planted: dict[str, Any] = {truth: size}
     table = falls(seed, rounds=case.rounds, scatter=case.scatter, **planted)
-    catalogue = [name for name in NAMES if case.in_catalogue or name != truth]
+    return table, [name for name in NAMES if case.in_catalogue or name != truth], truth
+
+
+def said(case: FormsCase, seed: int) -> Said:
+    """Draw a table, and say what its verdict is worth."""
+    table, catalogue, truth = drawn(case, seed)
     verdict: Verdict = calibrate(model_of(table, catalogue), draws=300, seed=seed, progress=False)
     named = {*verdict.effects, *([verdict.nearest.effect.name] if verdict.nearest else [])}
     alone, joined = verdict.final.interval("viscosity"), verdict.final_intervals["viscosity"]

@@ -24,10 +24,10 @@ import pandas as pd
 from threadpoolctl import threadpool_limits
 
 import softflagella as sf
-from benchmarks.calibration.forms import PLANTED, FormsCase, length
+from benchmarks.calibration.forms import FormsCase, drawn
 from benchmarks.common import heading, in_parallel, per_cent, row
 from calibration.own_model.model_file import load_model
-from tests.oracles.drawn_falls import EFFECTS, declared, falls
+from tests.oracles.drawn_falls import declared
 from tests.oracles.drawn_traces import FAMILIES, Design, draw_traces, model_of_traces, size_at
 from tests.oracles.others import MODELS, SETS, named
 from tests.oracles.peers import (
@@ -68,10 +68,8 @@ class Case(NamedTuple):
 
 
 def _falls(case: FormsCase, seed: int) -> tuple[sf.Model, pd.DataFrame, str]:
-    term = PLANTED[seed % len(PLANTED)] if case.strength[1] else ""
-    planted: dict[str, Any] = {term: case.strength[0] / length(term, case)} if term else {}
-    names = [effect.name for effect in EFFECTS if case.in_catalogue or effect.name != term]
-    return declared(names), falls(seed, rounds=case.rounds, scatter=case.scatter, **planted), term
+    table, catalogue, term = drawn(case, seed)
+    return declared(catalogue), table, term * bool(case.strength[1])
 
 
 def _cups(rho: float, kind: str, seed: int) -> tuple[sf.Model, pd.DataFrame, str]:
@@ -82,15 +80,13 @@ def _cups(rho: float, kind: str, seed: int) -> tuple[sf.Model, pd.DataFrame, str
     return model_of_traces(family), draw_traces(family, design, seed, **planted), term
 
 
-def _balls(label: str, *drawn: Any) -> Case:
-    return Case(
-        f"balls, {label}", partial(_falls, FormsCase("", *drawn)), {"viscosity": 1.0}, {"session": "round"}
-    )
+def _balls(label: str, *case: Any) -> Case:
+    return Case(f"balls, {label}", partial(_falls, FormsCase("", *case)), {"viscosity": 1.0}, {"session": "round"})
 
 
-def _of_cups(label: str, *drawn: Any) -> Case:
+def _of_cups(label: str, *case: Any) -> Case:
     truth, roles = FAMILIES["cups"].shared, {"session": "day", "trace": "trace"}
-    return Case(f"cups, {label}", partial(_cups, *drawn), truth, roles)
+    return Case(f"cups, {label}", partial(_cups, *case), truth, roles)
 
 
 CASES = (

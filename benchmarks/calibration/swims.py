@@ -67,14 +67,10 @@ def hidden(swim: LabSwim, seed: int) -> tuple[str, Robot]:
     raise InputError("no effect shows")
 
 
-def swum(truth: Robot, plan: Plan, swim: LabSwim) -> Any:
-    """Compare with a plan what the truth swims of it, without noise and kicks."""
-    return sf.check(plan, make_track(truth, plan, seed=0, camera=_EXACT, current=swim.disturbed["current"]))
-
-
-def error(truth: Robot, plan: Plan, swim: LabSwim) -> float:
-    """Compute how far from the path the truth swims a plan [m]."""
-    return float(swum(truth, plan, swim).raw_rms * plan.robot.length_scale)
+def error(truth: Robot, plan: Plan, swim: LabSwim) -> tuple[float, bool]:
+    """Compute how far from the path the truth swims a plan, without noise and kicks [m], and if that was stated."""
+    found = sf.check(plan, make_track(truth, plan, seed=0, camera=_EXACT, current=swim.disturbed["current"]))
+    return float(found.raw_rms * plan.robot.length_scale), bool(found.largest <= plan.stated_error)
 
 
 def answers(verdict: Verdict, truth: Robot, term: str) -> dict[str, Any]:
@@ -104,20 +100,17 @@ def said(case: str, seed: int) -> dict[str, Any]:
         term, truth = hidden(swim, seed) if case == _EFFECT else ("", swim.truth)
         track = make_track(truth, swim.plan, seed=seed, **swim.disturbed)
         record |= {"term": term, "size": truth.effects.get(term), "tails": truth.tails,
-                   "dwells": len(swim.plan.dwells), "as_given": error(truth, swim.plan, swim)}  # fmt: skip
+                   "dwells": len(swim.plan.dwells), "as_given": error(truth, swim.plan, swim)[0]}  # fmt: skip
         began = time.process_time()
         verdict: Any = sf.calibrate(track, swim.given, plan=swim.plan, seed=seed, jobs=1, progress=False)
         record |= {"seconds": time.process_time() - began} | answers(verdict, swim.truth, term)
         known = CalibrationKnowledge(current=swim.disturbed["current"])
-        with_verdict = sf.plan(swim.path, verdict, unit="m")
-        compared = swum(truth, with_verdict, swim)
-        again = float(compared.raw_rms * with_verdict.robot.length_scale)
-        best = error(truth, sf.plan(swim.path, truth, unit="m", knowledge=known), swim)
+        again, stated = error(truth, sf.plan(swim.path, verdict, unit="m"), swim)
+        best, _ = error(truth, sf.plan(swim.path, truth, unit="m", knowledge=known), swim)
     except Exception as failure:
         return (
             {"seconds": time.process_time() - began} | record | {"failed": f"{type(failure).__name__}: {failure}"}
         )
-    stated = bool(compared.largest <= with_verdict.stated_error)
     return record | {"again": again, "best": best, "near": again <= _NEAR * best, "stated": stated}
 
 

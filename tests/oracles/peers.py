@@ -45,7 +45,6 @@ class Measured:
     columns: Mapping[str, Any]  # (n,) each
     parts: Sequence[Any]  # rows of each trace, or of all
     session: Floats  # (n,) numbers from 0
-    own: tuple[str, ...]  # numbers that each part has of its own
 
     @classmethod
     def of(cls, model: sf.Model, table: pd.DataFrame, session: str | None, trace: str | None) -> Measured:
@@ -59,7 +58,12 @@ class Measured:
             if session is None
             else np.unique(columns[session], return_inverse=True)[1].astype(float)
         )
-        return cls(model, columns, parts, codes, tuple(n.name for n in model.numbers if n.per == "trace"))
+        return cls(model, columns, parts, codes)
+
+    @property
+    def own(self) -> tuple[str, ...]:
+        """Numbers that each part has of its own."""
+        return tuple(number.name for number in self.model.numbers if number.per == "trace")
 
     def scaled(self, output: str, values: Any) -> Floats:
         """Return an output on the scale on which it is fitted."""
