@@ -68,7 +68,7 @@ def hidden(swim: LabSwim, seed: int) -> tuple[str, Robot]:
 
 
 def error(truth: Robot, plan: Plan, swim: LabSwim) -> tuple[float, bool]:
-    """Compute how far from the path the truth swims a plan, without noise and kicks [m], and if that was stated."""
+    """Compute how far from the path the truth swims a plan, without noise and kicks [m]; is it as stated?"""
     found = sf.check(plan, make_track(truth, plan, seed=0, camera=_EXACT, current=swim.disturbed["current"]))
     return float(found.raw_rms * plan.robot.length_scale), bool(found.largest <= plan.stated_error)
 

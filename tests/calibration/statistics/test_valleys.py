@@ -117,6 +117,20 @@ def test_intervals_along_a_bent_valley_are_those_of_the_deviance_with_all_else_r
     assert fitted.interval("a") != pytest.approx(ends, abs=0.1)  # the covariance says something else
 
 
+def test_an_end_at_which_the_deviance_is_no_parabola_is_found_by_further_fits() -> None:
+    """The covariance puts it where the deviance has risen by more than twice as much as it should."""
+
+    def told(a: float) -> float:
+        return float(2.5 * (np.exp(0.8 * (a - 1)) - 1))
+
+    model = model_of(told, bend=3.0)
+    fitted = fitted_at(model, 1.0)
+    end = brentq(lambda a: told(a) ** 2 + ((a - 1) / PRIOR) ** 2 - RISE, 1, 8)
+    assert told(fitted.interval("a")[1]) ** 2 > 2 * RISE
+    assert profile_intervals(model, fitted, ALL)["a"][1] == pytest.approx(end, abs=0.05)
+    assert profile_intervals(model, fitted, ALL, in_valleys=False)["a"][1] != pytest.approx(end, abs=0.05)
+
+
 @pytest.mark.parametrize("far", [False, True])
 def test_a_fit_is_scored_where_it_ended_unless_it_is_far_above_the_noise(far: bool) -> None:
     """Where it is far, the rough model says what is missing; that a search has not converged is no reason."""

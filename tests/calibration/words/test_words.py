@@ -13,7 +13,7 @@ from jinja2 import UndefinedError
 
 from calibration.findings.next_runs import SELDOM
 from calibration.report.report import sections
-from calibration.words.render import next_steps, say_laws, sentence
+from calibration.words.render import headline, next_steps, say_laws, sentence
 from tests.calibration.toy_tables import ambiguous, effect, none, number
 
 VERDICTS = {"none": none, "number": number, "effect": effect, "ambiguous": ambiguous}
@@ -51,7 +51,26 @@ SPREAD = {
 PARTIAL = {"verdict": "partial", "nearest": SPREAD, "held_out_error_falls": True}
 
 
+BORNE_OUT = {"held_out_error_falls": True, "gain_is_certain": True, "held_out_runs_agree": True}
 RISEN = {"held_out_error_falls": False, "error_before": 0.03, "error_after": 0.031}
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "said"),
+    [
+        ("effect", {}, "Missing: "),
+        ("effect", RISEN, "Not confirmed: "),
+        ("effect", {"gain_is_certain": False}, "Not confirmed: "),
+        ("effect", {"held_out_runs_agree": False}, "Not confirmed: "),
+        ("ambiguous", BORNE_OUT, " explains these runs."),
+        ("ambiguous", RISEN, " may explain these runs."),
+        ("none", {"noise_known": False}, "The noise is unknown, so no effect can be judged."),
+    ],
+)
+def test_a_headline_does_not_call_missing_what_held_out_runs_do_not_bear_out(
+    name: str, changes: dict[str, Any], said: str
+) -> None:
+    assert said in headline(stored(name, **changes))
 
 
 @pytest.mark.parametrize(
