@@ -153,7 +153,7 @@ def robot_of(content: Mapping[str, Any], name: str) -> Robot:
     """
     if describes_vehicle(content):
         raise InputError(
-            "a vehicle has no simulation, no look-up table and no page, only plan, goal, tour, hold and track; "
+            "a vehicle has no simulation and no look-up table, only plan, goal, tour, hold, track and page; "
             f"here give a robot.toml or one of {', '.join(PRESETS)}"
         )
     tables = dict(content)

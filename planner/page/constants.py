@@ -14,6 +14,7 @@ from common import units
 from planner.page.first_state import camel
 from planner.paths.path_files import READERS
 from planner.planning.request import PlanRequest
+from planner.vehicle.measured import MeasuredVehicle
 from sim.knowledge import UNMEASURED
 from sim.model import uncertainty
 from sim.model.entries import ENTRIES
@@ -41,6 +42,7 @@ _NAMES = {  # of each module; a leading underscore is left out
     "planner.planning.plan": "WIDE OWN_TABLE_FROM",
     "planner.planning.solve": "WORTH SAVED LENGTHENED_FROM MORE GROWS MARGINS OTHERS",
     "planner.vehicle.from_table": "ODD TIME_STEPS STEP",
+    "planner.vehicle.measured": "SUBSTEPS",
     "planner.vehicle.vehicle": "SHORTEST STEP TIMES BEFORE_KNOTS",
     "planner.vehicle.zigzag": "PAIRS TRIES QUICK LONGEST KEPT NEARLY COMPARED WIDEST COUNT LONGER",
     "common.run_columns": "RUN RUN_SYNONYMS MEASURED RUN_NOTES RUN_SIGMAS RUN_COLUMNS",
@@ -77,6 +79,7 @@ def constants() -> dict[str, dict[str, Any]]:
     found["paths_units"] = _of("planner.paths.units", ["LONGEST", "SMALLEST"])
     found["stated_error"]["CAMERA"] = request.camera.to_dict()
     found["units"]["SIGNS"] = {chr(sign): str(word) for sign, word in units._SIGNS.items()}
+    found["measured"]["MODEL"] = MeasuredVehicle.MODEL
     found["knowledge"] = {
         "UNMEASURED": dict(zip(UNMEASURED.names, np.sqrt(np.diag(UNMEASURED.covariance)).tolist(), strict=True))
     }

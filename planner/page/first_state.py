@@ -11,8 +11,9 @@ import numpy as np
 from common.errors import InputError
 from planner.jobs.plan import make_plan
 from planner.paths.path import Path2D
-from planner.paths.units import extent
+from planner.paths.units import Scales, extent
 from planner.planning.request import PlanRequest
+from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.tracked_point import TrackedVehicle
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
@@ -44,10 +45,22 @@ def robot_fields(robot: Robot) -> dict[str, Any]:
     return {"name": robot.name, **values, "effects": dict(robot.effects)}
 
 
-def robots_of(robot: Robot) -> list[dict[str, Any]]:
-    """Return the robot of the page, and those of the paper."""
-    others = [preset for preset in PRESETS.values() if preset.name != robot.name]
-    return [{"name": each.name, "fields": robot_fields(each)} for each in (robot, *others)]
+def vehicle_fields(vehicle: MeasuredVehicle) -> dict[str, Any]:
+    """Return a measured vehicle as the page has it: its scales, and the lines of a vehicle.toml in their order."""
+    return {
+        "name": vehicle.name,
+        "tailLength": vehicle.length_scale,
+        "timeScale": vehicle.time_scale,
+        "outline": vehicle.outline,
+        "measured": list(vehicle.to_dict().items()),
+    }
+
+
+def robots_of(robot: Robot | MeasuredVehicle) -> list[dict[str, Any]]:
+    """Return the robot or vehicle of the page, and the robots of the paper."""
+    others = [robot_fields(preset) for preset in PRESETS.values() if preset.name != robot.name]
+    first = vehicle_fields(robot) if isinstance(robot, MeasuredVehicle) else robot_fields(robot)
+    return [{"name": fields["name"], "fields": fields} for fields in (first, *others)]
 
 
 def slider_ends(robot: Robot, domain: Mapping[str, tuple[float, float]]) -> dict[str, list[float]]:
@@ -161,12 +174,12 @@ def first_plan(path: Path2D, tracked: TrackedVehicle, request: PlanRequest) -> d
     }
 
 
-def first_options(request: PlanRequest, robot: Robot, smooth: float | None) -> dict[str, Any]:
+def first_options(request: PlanRequest, robot: Scales, smooth: float | None) -> dict[str, Any]:
     """Return the options of the page's first plan: times in s, the tolerance and the smoothing in cm.
 
     Args:
         request: what is asked of the plan.
-        robot: the robot.
+        robot: the robot, or a vehicle.
         smooth: length over which a drawn stroke is smoothed [l].
 
     Raises:
@@ -174,7 +187,7 @@ def first_options(request: PlanRequest, robot: Robot, smooth: float | None) -> d
     """
     if request.dwell is not None or request.seed:
         raise InputError("the page has no option for a dwell or a seed of its own")
-    cm = 100 * robot.tail_length
+    cm = 100 * robot.length_scale
     least = request.least_dwell(robot)
     return {
         "objective": request.objective,

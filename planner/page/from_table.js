@@ -7,7 +7,7 @@ import { MIRROR } from "./math.js";
 import { groupValues } from "./robot.js";
 import { OutsideError, query, response, tableErrorModes, within } from "./table.js";
 import { fromSi } from "./units.js";
-import { BEFORE, lagTable, resampled, trackedPoint } from "./vehicle.js";
+import { BEFORE, lagTable, modeBetween, resampled, trackedPoint } from "./vehicle.js";
 import { InputError, general, quoted, refusing } from "./words.js";
 
 const { ODD, TIME_STEPS } = CONSTANTS.from_table, { STEP: CHANGE } = CONSTANTS.from_table;
@@ -75,14 +75,7 @@ function unmeasuredModes(groups, table, vehicle) {
       const edge = { twist: vehicle.twist, lag: vehicle.lag, step: 0 }; // of the table
       return refusing(() => ({ ...motionOfOther(table, values), step }), () => edge);
     });
-    const scale = sigma / (above.step - below.step || Infinity);
-    const slope = (one, other) => Float64Array.from(one, (value, i) => scale * (value - other[i]));
-    return {
-      name: `coefficients: ${k + 1}`,
-      twist: above.twist.map((twist, side) => slope(twist, below.twist[side])),
-      lag: above.lag.map((lag, side) => slope(lag, below.lag[side])),
-      current: [0, 0],
-    };
+    return modeBetween(`coefficients: ${k + 1}`, above, below, sigma / (above.step - below.step || Infinity));
   });
 }
 

@@ -162,7 +162,7 @@ const USES = { // columns that may be left out, and what they are good for
 function comparedRuns(table, name, fields, lookup) {
   if (!lookup) {
     throw new InputError(
-      "runs can only be compared with the trained look-up table, and this page has the vehicle of one robot alone",
+      "runs can only be compared with the trained look-up table, and this page has one vehicle alone",
     );
   }
   const runs = readMeasurements(table, name), columns = runs.outputs.map((output) => OUTPUTS[output].column);

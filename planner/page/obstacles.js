@@ -5,6 +5,7 @@
 import { CONSTANTS } from "./constants.js";
 import { clip, largestSize, smallest } from "./math.js";
 import { pathLength, pathOf } from "./path.js";
+import { outlineOf } from "./robot.js";
 import { inLab, placeInLab } from "./units.js";
 import { pivotDistance } from "./vehicle.js";
 import { InputError, quoted, refusing } from "./words.js";
@@ -67,11 +68,10 @@ function polygonOf(points, word) {
 }
 
 /* Cover the body with discs; origin: from the head's centre forward to the point from which places count. */
-function footprint({ headLength, headRadius, discOffset, tailRadius, tailLength }, origin) {
-  const front = headLength / 2 / tailLength, length = 2 * front + 1;
-  const width = Math.max(headRadius, (discOffset || headRadius) + tailRadius) / tailLength;
+function footprint(robot, origin) {
+  const [front, back, width] = outlineOf(robot), length = front - back;
   const count = Math.max(2, Math.ceil(length / width)), step = length / count;
-  const places = Array.from({ length: count }, (_, i) => front - length + step * (i + 0.5) - origin);
+  const places = Array.from({ length: count }, (_, i) => back + step * (i + 0.5) - origin);
   return { places, radius: Math.hypot(width, step / 2) };
 }
 

@@ -55,13 +55,13 @@ function planRecord(plan, codeVersion = null) {
 
 function planContent(plan) {
   const { tracked, declared, errors, switches, drawn, straight, guidance } = plan, { robot } = tracked;
-  const [x, y, heading] = switches.poses[0];
+  const [x, y, heading] = switches.poses[0], tailLength = robot.tailLength;
+  const swims = robot.measured
+    ? { vehicle: Object.fromEntries(robot.measured), tail_length_m: tailLength }
+    : { groups: groupValues(robot), tail_length_m: tailLength, motor_speed_rad_s: robot.motorSpeed };
   return {
     format: new Whole(FORMAT),
-    robot: {
-      name: robot.name, groups: groupValues(robot), tail_length_m: robot.tailLength,
-      motor_speed_rad_s: robot.motorSpeed, time_scale_s: robot.timeScale,
-    },
+    robot: { name: robot.name, ...swims, time_scale_s: robot.timeScale },
     point: tracked.point,
     offset_over_l: tracked.offset,
     first_direction: new Whole(switches.firstDirection),
@@ -167,7 +167,7 @@ function controllerHeader(plan, id, template) {
   const parts = {
     IDENTITY: id, NAME: safeName(robot), AFTER: "Stop after the last entry.", MODEL: model, STATED: statedWithin(plan),
     FIRST_DIRECTION: plan.switches.firstDirection, COUNT: entries.length, TOTAL: sum(entries),
-    MOTOR: `#define SCHEDULE_MOTOR_RPM ${((robot.motorSpeed * 30) / Math.PI).toFixed(3)}\n`,
+    MOTOR: robot.measured ? "" : `#define SCHEDULE_MOTOR_RPM ${((robot.motorSpeed * 30) / Math.PI).toFixed(3)}\n`,
     X_CM: (cm * x).toFixed(4), Y_CM: (cm * y).toFixed(4), DEGREES: (DEGREES * heading).toFixed(3),
     X: x.toFixed(6), Y: y.toFixed(6), HEADING: heading.toFixed(6), CHECKPOINTS: places.length,
     entries: lines.join(",\n    "), places: places.join(",\n    "),

@@ -4,7 +4,8 @@
  * A robot is {name, tails, tailLength, tailRadius, youngsModulus, headRadius, headLength, viscosity, motorSpeed, C_t,
  * C_r, C_yr, discOffset, sigmas} and what follows from them: timeScale [s] and omegaBar. Lengths in m, modulus in Pa,
  * viscosity in Pa s, speed in rad/s. A robot whose groups Python has written, with its effects, has them
- * as `groups`; a file with effects or a calibration is refused: Python makes its vehicle. */
+ * as `groups`; a file with effects or a calibration is refused: Python makes its vehicle. A vehicle of which Python has
+ * written its `outline` has no robot (measured_vehicle.js). */
 import { CONSTANTS } from "./constants.js";
 import { isWhole } from "./seals.js";
 import { UNITS, fromSi, splitName, toSi } from "./units.js";
@@ -64,11 +65,23 @@ function groupValues(robot) {
   };
 }
 
+/* Front and back of the body, forward from the point whose poses count, and half of its width [l]. */
+function outlineOf({ outline, headLength, headRadius, discOffset, tailRadius, tailLength }) {
+  if (outline) return outline;
+  const front = headLength / 2 / tailLength;
+  return [front, -front - 1, Math.max(headRadius, (discOffset || headRadius) + tailRadius) / tailLength];
+}
+
 /* Read a robot. where: the file's name, for messages. */
 function readRobot(text, where) {
   const { name = where.replace(/\.[^.]*$/, ""), ...tables } = readToml(text.replace(/^\ufeff/, ""), where);
   if ("correction" in tables) {
     throw new InputError(`${where}: [correction] is no longer read; calibrate the robot as it was given again`);
+  }
+  if (Object.keys(tables).some((key) => splitName(key).quantity === "speed")) {
+    throw new InputError(
+      `${where} is a measured vehicle; make a page of it: softflagella page --robot ${where} --out page.html`,
+    );
   }
   const locked = LOCKED.find((table) => table in tables);
   if (locked) {
@@ -243,4 +256,4 @@ function written(value, { unit, field }) {
   return { unit: SI[UNITS.get(unit).kind], number: repr(value) };
 }
 
-export { makeRobot, groupValues, readRobot, robotToml };
+export { makeRobot, groupValues, outlineOf, readRobot, robotToml };

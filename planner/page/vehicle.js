@@ -15,6 +15,7 @@
 import { CONSTANTS } from "./constants.js";
 import { arc, clip, column, compose, dot, geomspace, interp, largest, largestSize, mean, indexBelow } from "./math.js";
 import { splineMatrix } from "./math.js";
+import { outlineOf } from "./robot.js";
 import { InputError, general, quoted } from "./words.js";
 
 const { DWELLS, BEFORE, FORGOTTEN } = CONSTANTS.response;
@@ -114,13 +115,24 @@ function trackedPoint(robot, { vehicle, unmeasured, calibrated, ownTable }, poin
   if (!POINTS.includes(point)) {
     throw new InputError(`point ${quoted(point)}; allowed are ${POINTS.join(", ")}`, "options");
   }
-  const offset = [0, robot.headLength / 2 / robot.tailLength, -pivotDistance(vehicle)][POINTS.indexOf(point)];
+  const offset = [0, outlineOf(robot)[0], -pivotDistance(vehicle)][POINTS.indexOf(point)];
   const { tailGap, leastGap } = vehicle, warnings = [];
   if (tailGap < leastGap) {
     const without = leastGap === 1 ? "the model has no contact" : "contact does not hold them apart";
     warnings.push(`tails touch (predicted gap ${tailGap.toFixed(2)} diameters): ${without}`);
   }
   return { robot, vehicle, point, offset, model, ownTable, calibrated, unmeasured, warnings };
+}
+
+/* The mode of a cause by which a motion {twist, lag} goes from `below` to `above`, times a factor. */
+function modeBetween(name, above, below, factor) {
+  const slope = (one, other) => Float64Array.from(one, (value, i) => factor * (value - other[i]));
+  return {
+    name,
+    twist: above.twist.map((twist, side) => slope(twist, below.twist[side])),
+    lag: above.lag.map((lag, side) => slope(lag, below.lag[side])),
+    current: [0, 0],
+  };
 }
 
 /* Resample a flat curve over DWELLS at TIMES. Below the shortest dwell it is a straight line to zero. */
@@ -301,5 +313,5 @@ function checkLeast(least) {
 }
 
 export { BEFORE, CURVE, BEFORE_KNOTS, COUNT, SAMPLES, SHORTEST, STEP, sideOf, motionAfter, lagPlace, lagAt, lagNoise };
-export { yawRate, pivotDistance, pivotRadius, turnRadius, speedOf, rodOf, trackedPoint, resampled, lagTable, rollOut };
-export { zigzag, zigzagHysteresis, zigzagSpeed, QUICK, dwellsFor, nearlyFastest, longerDwells, longestDwell, checkLeast };
+export { yawRate, pivotDistance, pivotRadius, turnRadius, speedOf, rodOf, trackedPoint, modeBetween, resampled, lagTable };
+export { rollOut, zigzag, zigzagHysteresis, zigzagSpeed, QUICK, dwellsFor, nearlyFastest, longerDwells, longestDwell, checkLeast };

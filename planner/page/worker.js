@@ -13,6 +13,7 @@ import { followedPath, makePlan, planRequest } from "./plan.js";
 import { planDuration, planFiles, planRecord, planSeconds, planWarnings } from "./plan_files.js";
 import { makeRobot, robotToml } from "./robot.js";
 import { comparedRuns, comparedTrack } from "./measured.js";
+import { trackedMeasured, vehicleToml } from "./measured_vehicle.js";
 import { readTable } from "./table.js";
 import { QUICK, SAMPLES, longestDwell, speedOf, trackedPoint, turnRadius, yawRate } from "./vehicle.js";
 import { InputError, inPage, refusing, repr } from "./words.js";
@@ -20,11 +21,12 @@ import { InputError, inPage, refusing, repr } from "./words.js";
 const STROKE = 60; // a drawn stroke is smoothed over this part of its length
 const TRADED = 10; // dwells of the trade-off
 
-/* Make the answers to the page's questions, by name. `data` is what Python has written: {table, files}. */
+/* Make the answers to the page's questions, by name. `data` is what Python has written: {table, files}; a measured
+ * vehicle has no table. */
 async function service(data) {
-  const locked = data.table.vehicle ? await readData(data.table, true) : null; // a robot that is not computed anew
+  const locked = data.table?.vehicle ? await readData(data.table, true) : null; // a robot that is not computed anew
   if (locked) locked.vehicle = vehicleOfParts(locked.vehicle, locked.name);
-  const table = locked ? null : await readTable(data.table);
+  const table = locked || !data.table ? null : await readTable(data.table);
   let last = null; // {key, plan}: the plan that the page shows
   const opened = new Map(); // plan.json files by their ids, for tracks of these plans
   let asked = null; // {key, swims}: the vehicle that was asked for last
@@ -32,10 +34,14 @@ async function service(data) {
   function tracked(fields, point) {
     const key = JSON.stringify([fields, point]);
     if (asked?.key === key) return asked.swims;
-    const robot = makeRobot(locked ? { ...fields, groups: locked.groups } : fields);
-    const swims = locked ? trackedPoint(robot, locked, point, locked.identity) : trackedVehicle(robot, table, point);
-    asked = { key, swims };
-    return swims;
+    asked = { key, swims: trackedOf(fields, point) };
+    return asked.swims;
+  }
+
+  function trackedOf(fields, point) {
+    if (fields.measured) return trackedMeasured(fields, point);
+    if (!locked) return trackedVehicle(makeRobot(fields), table, point);
+    return trackedPoint(makeRobot({ ...fields, groups: locked.groups }), locked, point, locked.identity);
   }
 
   function planOf(wish, progress = null) {
@@ -68,6 +74,7 @@ async function service(data) {
       if (name === "path.csv" && wish.options.goal) throw new InputError("a way to a goal has no path.csv; take plan.json along");
       if (name === "path.csv") return pathTable(drawnPath(wish.path));
       if (name === "robot.toml") return robotToml(makeRobot(wish.robot));
+      if (name === "vehicle.toml") return vehicleToml(wish.robot);
       return planFiles(planOf(wish), data.files)[name];
     },
     open: (file) => {

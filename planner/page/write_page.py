@@ -7,7 +7,7 @@ The numbers of a look-up table are text in the page: lossless, and as small as t
 Arrays are replaced by {"tensor": shape, "at": place of the first number}. All numbers stand one behind the other
 in double precision: first the lowest bytes of all, then the next ones, since only the highest bytes are alike.
 They are deflated and written in base 85, with letters that mean nothing in HTML and JSON. `data.js` reads this.
-The shipped table takes 1.3 MB; in base 64 it would be 90 kB more.
+The shipped table takes 1.3 MB; in base 64 it would be 90 kB more. A measured vehicle needs none.
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ import json
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from os import PathLike
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,12 +32,14 @@ from common.files import write_text
 from common.keywords import checks_keywords
 from common.provenance import __version__, code_version
 from planner.files.headers import schedule_template
-from planner.options import CornerOptions, Length, length_of, request_of, table_of
+from planner.options import CornerOptions, Length, asked, length_of, request_of, swimmer_of, table_of
 from planner.page.bundle import FOLDER, joined
 from planner.page.first_state import NamedPath, first_options, first_plan, robots_of, shapes_of, slider_ends
 from planner.paths.path import Path2D, circle, shape_of
 from planner.paths.path_files import read_path
+from planner.planning.request import PlanRequest
 from planner.vehicle.from_table import both_directions
+from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.vehicle import Mode
 from sim.knowledge import CalibrationKnowledge
@@ -47,6 +50,8 @@ from surrogate.table import NeuralTable, table_content
 
 _LETTERS = str.maketrans("<>&`", ",.:/")  # of RFC 1924, which HTML or a template of JavaScript would read
 TITLE = "Plan a path for a soft robot"
+_VEHICLE_TITLE = "Plan a path for a vehicle"
+_MEASURED = "These numbers were measured; the page plans for this vehicle alone."
 _VIEW = FOLDER / "view"
 
 
@@ -86,7 +91,7 @@ def _without_arrays(part: Any, arrays: list[Floats]) -> Any:
 @checks_keywords
 def write_page(
     path: str | Path,
-    robot: OneRobot = "paper-control",
+    robot: OneRobot | MeasuredVehicle = "paper-control",
     *,
     paths: Mapping[str, Path2D | ArrayLike] | Sequence[str] = (),
     smooth: Length | None = None,
@@ -97,8 +102,9 @@ def write_page(
 
     Args:
         path: the file.
-        robot: robot.toml or the name of a preset, that the page begins with. Robots with effects or a calibration
-            cannot be changed in the page. In Python also the robot.
+        robot: robot.toml or the name of a preset, that the page begins with, or the vehicle.toml of a measured
+            vehicle. Vehicles, and robots with effects or a calibration, cannot be changed in the page. In Python
+            also the robot or the vehicle.
         paths: a path that the page offers: a file, or a shape such as circle:20cm; the first one is planned when
             the page opens. In Python also points (n, 2) or a Path2D by name, in tail lengths l.
         smooth: LENGTH, smooth drawn strokes over this length, such as 1cm.
@@ -116,7 +122,8 @@ def write_page(
         ...     0.5e6 < page.stat().st_size < 1.6e6
         True
     """
-    swims, unit = one_robot(robot), options.get("unit")
+    swims = swimmer_of(robot if isinstance(robot, MeasuredVehicle | str | PathLike) else one_robot(robot))
+    unit = options.get("unit")
     named = []
     if isinstance(paths, Mapping):
         for name, each in paths.items():
@@ -128,18 +135,19 @@ def write_page(
                 drawn = read_path(name).in_tails(swims, unit)
             short = Path(name).stem if shape_of(name) is None else name
             named.append(NamedPath(short, drawn.scaled(swims.length_scale)))
-    table, known = table_of(robot, swims, options)
     over = None if smooth is None else length_of(smooth, unit, swims, "--smooth")
-    request = request_of(options, swims)
-    tracked = tracked_vehicle(swims, table, request.point, known)
-    why = _locked(swims, table, known)
+    if isinstance(swims, MeasuredVehicle) or isinstance(robot, MeasuredVehicle):
+        asks = _PageParts(*asked(swims, options), why=_MEASURED)
+    else:
+        asks = _parts_of_robot(robot, swims, options)
+    tracked, request, why = asks.tracked, asks.request, asks.why
     # The page shows this plan until its own planner has made it.
     shapes = shapes_of(tracked.vehicle.turn_radius * swims.length_scale, named)
     first = named[0].path if named else circle(shapes[0]["size"] / 100)
     plan = first_plan(first.scaled(1 / swims.length_scale), tracked, request)
     data = {
         "robots": robots_of(swims)[: 1 if why else None],
-        "limits": slider_ends(swims, table.domain),
+        "limits": asks.limits,
         "shapes": shapes,
         "first": {
             "robot": swims.name,
@@ -149,17 +157,36 @@ def write_page(
         },
         "locked": {"name": swims.name, "why": why} if why else None,
         "planner": {
-            "table": _planner_data(table, swims, tracked, why),
+            "table": asks.table,
             "files": {"codeVersion": code_version(), "schedule": schedule_template()},
         },
     }
     version = f"softflagella {__version__}"
-    footer = (
-        f"{version}, code {code_version()}. Robot {swims.name}. Look-up table {table.identity}. The page "
-        "computes in your browser and sends nothing."
-    )
-    write_text(path, page_text(title or TITLE, footer, data, version))
+    is_vehicle = isinstance(swims, MeasuredVehicle)
+    whose = f"Vehicle {swims.name}" if is_vehicle else f"Robot {swims.name}. Look-up table {tracked.model}"
+    footer = f"{version}, code {code_version()}. {whose}. The page computes in your browser and sends nothing."
+    default = _VEHICLE_TITLE if is_vehicle else TITLE
+    write_text(path, page_text(title or default, footer, data, version))
     return Path(path)
+
+
+class _PageParts(NamedTuple):
+    """What the page plans with, and what of it can be changed."""
+
+    tracked: TrackedVehicle
+    request: PlanRequest  # of the first plan
+    why: str  # no other robot can be computed; empty: it can
+    limits: Mapping[str, list[float]] = {}  # ends of the sliders of what can be changed
+    table: dict[str, Any] | None = None  # numbers for the planner; None: a measured vehicle needs none
+
+
+def _parts_of_robot(robot: OneRobot, swims: Robot, options: CornerOptions) -> _PageParts:
+    """Ask the look-up table that knows a robot."""
+    table, known = table_of(robot, swims, options)
+    request = request_of(options, swims)
+    tracked, why = tracked_vehicle(swims, table, request.point, known), _locked(swims, table, known)
+    limits = {} if why else slider_ends(swims, table.domain)
+    return _PageParts(tracked, request, why, limits, _planner_data(table, swims, tracked, why))
 
 
 def _locked(robot: Robot, lookup: LookupTable, knowledge: CalibrationKnowledge) -> str:

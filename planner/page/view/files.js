@@ -67,11 +67,12 @@ function plain(element, levels) {
 
 const UNITS = { mm: 0.1, cm: 1, m: 100, in: 2.54 };
 
-/* Ask; the promise resolves with {points [cm], closed, name}, or null if the user takes none. */
-function askUnit({ paths, unit }, tailLength) {
+/* Ask; the promise resolves with {points [cm], closed, name}, or null if the user takes none. others: sizes of further
+ * units by their names [cm]. */
+function askUnit({ paths, unit }, others) {
   if (unit !== null && paths.length === 1) return Promise.resolve(inUnit(paths[0], unit));
   const dialog = byId("unit-dialog"), asks = unit === null, several = paths.length > 1;
-  const scales = Object.entries(asks ? { ...UNITS, "tail lengths": tailLength } : { "as the file says": unit });
+  const scales = Object.entries(asks ? { ...UNITS, ...others } : { "as the file says": unit });
   const choice = (group, value, words, checked) => {
     const input = element("input", { type: "radio", name: group, value, checked, autofocus: checked });
     return element("label", { class: "choice" }, input, words);

@@ -6,13 +6,14 @@ import { chart, marker, tradeOff } from "./charts.js";
 import { byId, pictureText, save, say } from "./dom.js";
 import { PathEditor, showCorners } from "./editor.js";
 import { askUnit, oneFile, Problem } from "./files.js";
-import { connect, RobotForm, showMotion, showResults, summary } from "./panels.js";
+import { connect, RobotForm, showMeasured, showMotion, showResults, summary } from "./panels.js";
 import { PlanView } from "./plan_view.js";
 import { PlannerClient } from "./planner_client.js";
 import { Player } from "./player.js";
 import { Runs, showTrack } from "./runs.js";
 import { addressOf, fromAddress, History, labValues, onGrid, pointsRefusal, wishOf } from "./state.js";
 
+const MARK = 0.2; // mean turn radii, length of a vehicle without a size in the picture
 const PAUSE = 120; // ms after the last change that goes on, such as by a slider, until a plan begins
 
 class Page {
@@ -31,6 +32,7 @@ class Page {
     this.player = new Player((pose, time) => this.played(pose, time));
     this.form = new RobotForm(data.limits, (values, key) => this.setRobot(values, key), () => this.history.settle());
     const { robot, shape, options } = data.first, { fields } = this.robots.get(robot);
+    this.measured = fields.measured ? fields : null; // a vehicle that is not a robot
     this.initial = { robot: { name: robot, values: labValues(fields) }, path: this.ofShape(shape), options };
     this.plan = null;
     this.refused = false; // whether the newest wish is
@@ -49,6 +51,7 @@ class Page {
     this.history = new History(state);
     this.linkProblem.tell("path", problem);
     connect(this);
+    if (this.measured) showMeasured(this.measured);
     this.refresh();
     if (plan && state === this.initial) this.planned({ answer: plan }, this.wish());
     this.planNow();
@@ -57,7 +60,7 @@ class Page {
   /* The state that the address holds: {state, problem}. */
   address() {
     const shapes = this.data.shapes.map((shape) => shape.name);
-    return fromAddress(location.hash.slice(1), this.initial, shapes);
+    return fromAddress(location.hash.slice(1), this.initial, shapes, this.data.locked);
   }
 
   worker() {
@@ -161,7 +164,7 @@ class Page {
     this.timer = null;
     this.writeAddress();
     const wish = this.wish();
-    this.client.ask("steady", wish).then((answer) => answer.stopped || showMotion(answer));
+    if (!this.measured) this.client.ask("steady", wish).then((answer) => answer.stopped || showMotion(answer));
     this.runs.compare(wish.robot);
     const progress = ({ stage, done }) => say(byId("progress"), `Planning: ${stage}, ${Math.round(100 * done)} %`);
     this.client.plan({ content: wish, began: () => this.began(), progress, done: (answer) => this.planned(answer, wish) });
@@ -316,11 +319,15 @@ class Page {
   }
 
   async opened(name, content) {
-    if (content.kind === "robot") {
+    if (content.kind === "robot" && this.data.locked) {
+      const command = `softflagella page --robot ${name} --out page.html`;
+      this.fileProblem.tell("robot", `this page plans for ${this.data.locked.name} alone; make a page of ${name}: ${command}`);
+    } else if (content.kind === "robot") {
       this.robots.set(content.fields.name, content);
       this.change({ robot: { name: content.fields.name, values: labValues(content.fields) } });
     } else if (content.kind === "path") {
-      const path = await askUnit(content, this.plan?.tailLength ?? 10);
+      const scales = { [this.measured ? "mean turn radii" : "tail lengths"]: this.plan?.tailLength ?? 10 };
+      const path = await askUnit(content, scales);
       if (path) {
         this.view.moved = false;
         this.setPoints(path.points, path.closed, path.name, path.points);
@@ -401,11 +408,18 @@ function shown(plan, robot) {
     ...plan, track, flips: track.filter((_, i) => i % samples === 0), start: motion[0], seconds: sum(dwells),
     warnings: warnings.map((words) => inPage(words, robot)),
     tailLength: cm(robot.tailLength),
-    body: {
+    body: robot.measured ? bodyOf(robot) : {
       headLength: cm(robot.headLength), headRadius: cm(robot.headRadius), tailLength: cm(robot.tailLength),
       tailRadius: cm(robot.tailRadius), discOffset: cm(robot.discOffset ?? robot.headRadius), tails: robot.tails,
     },
   };
+}
+
+/* What the picture draws of a measured vehicle: its body; a slim mark where it has no size. */
+function bodyOf({ measured, tailLength }) {
+  const { length_m: long, width_m: wide } = Object.fromEntries(measured);
+  const headLength = 100 * (long || wide || MARK * tailLength);
+  return { headLength, headRadius: wide ? 50 * wide : headLength / 6, tails: 0 };
 }
 
 async function begin() {

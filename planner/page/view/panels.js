@@ -49,13 +49,14 @@ function goalWords({ goal, motion, way }, size) {
 }
 
 class RobotForm {
-  /* `limits` has the slider's ends of each field; `changed(values, key)` takes new values, `settled()` the end. */
+  /* `limits` has the slider's ends of each field that can be changed; `changed(values, key)` takes new values,
+   * `settled()` the end. */
   constructor(limits, changed, settled) {
     this.changed = changed;
     this.settled = settled;
     this.inputs = new Map();
     const place = ({ first }) => byId(first ? "first-fields" : "more-fields");
-    for (const field of FIELDS) place(field).append(this.field(field, limits[field.key]));
+    for (const field of FIELDS.filter(({ key }) => key in limits)) place(field).append(this.field(field, limits[field.key]));
   }
 
   field({ key, words, unit, step, optional }, [low, high]) {
@@ -107,6 +108,27 @@ function showMotion(answer) {
   ]);
 }
 
+const DEGREES = 180 / Math.PI;
+const NUMBERS = [ // of a measured vehicle: key, words, unit, number of the unit in one SI unit
+  ["speed_m_s", "Speed on its circle", "cm/s", 100], ["turn_left_rad_s", "Turn to the left", "degrees/s", DEGREES],
+  ["turn_right_rad_s", "Turn to the right", "degrees/s", DEGREES], ["slip_rad", "Slip angle", "degrees", DEGREES],
+  ["lag_s", "Lag", "s", 1],
+];
+
+/* Show the numbers of a measured vehicle, and say of it what the page says of robots otherwise. */
+function showMeasured({ measured, name }) {
+  for (const node of document.querySelectorAll("[data-vehicle]")) node.textContent = node.dataset.vehicle;
+  const lines = Object.fromEntries(measured), { length_m: long, width_m: wide } = lines, cm = (size) => sixDigits(100 * size);
+  describe(byId("motion"), [
+    ["Name", name],
+    ...NUMBERS.map(([key, words, unit, perSi]) => {
+      const [value, spread] = lines[key].map((number) => number * perSi);
+      return [words, `${sixDigits(value)}${spread ? ` ± ${Number(spread.toPrecision(3))}` : ""} ${unit}`];
+    }),
+    ...(long || wide ? [["Body", `${cm(long)} × ${cm(wide)} cm`]] : []),
+  ]);
+}
+
 /* Fill the lists, and connect every control to the page. */
 function connect(page) {
   const { data } = page, choice = (value, words) => element("option", { value }, words);
@@ -117,7 +139,8 @@ function connect(page) {
     if (target.matches("button:enabled")) page.saveFile(target.textContent);
   });
   if (data.locked) {
-    byId("robot-fields").hidden = true;
+    byId("robot-fields").hidden = byId("or-runs").hidden = true;
+    byId("open").title = "A path (CSV, SVG, plan.json) or a track";
     say(byId("locked"), data.locked.why);
   }
   connectButtons(page);
@@ -224,4 +247,4 @@ function connectWindow(page) {
   });
 }
 
-export { connect, RobotForm, showMotion, showResults, summary };
+export { connect, RobotForm, showMeasured, showMotion, showResults, summary };

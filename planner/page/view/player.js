@@ -64,7 +64,7 @@ class Player {
     if (!this.plan) return;
     const { pose, dwell } = poseAt(this.plan, this.ends, this.time);
     const direction = dwell % 2 ? -this.plan.firstDirection : this.plan.firstDirection;
-    const words = `${clock(this.time)} of ${clock(this.end)}, motor ${direction > 0 ? "+" : "−"}`;
+    const words = `${clock(this.time)} of ${clock(this.end)}, ${byId(direction > 0 ? "plus" : "minus").textContent}`;
     byId("clock").textContent = words;
     byId("time").setAttribute("aria-valuetext", words);
     this.moved(pose, this.time);

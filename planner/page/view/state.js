@@ -102,24 +102,26 @@ function addressOf(state, initial) {
   return parts.length ? [`v=${VERSION}`, ...parts].join("&") : "";
 }
 
-/* Read an address; return {state, problem}. A problem is a sentence, and the state is then `initial`. */
-function fromAddress(text, initial, shapes) {
+/* Read an address; return {state, problem}. A problem is a sentence, and the state is then `initial`. locked: whether the
+ * page has no other robot than the initial one. */
+function fromAddress(text, initial, shapes, locked = false) {
   if (text === "") return { state: initial, problem: "" };
   try {
     if (text.split("&").includes("")) throw new Error("it is cut off or damaged");
-    return { state: readState(new Map(new URLSearchParams(text)), initial, shapes), problem: "" };
+    return { state: readState(new Map(new URLSearchParams(text)), initial, shapes, locked), problem: "" };
   } catch (broken) {
     const problem = `The link cannot be read: ${broken.message}. The page shows its own first plan.`;
     return { state: initial, problem };
   }
 }
 
-function readState(parts, initial, shapes) {
+function readState(parts, initial, shapes, locked) {
   const values = { ...initial.robot.values }, options = { ...initial.options };
   const known = ["v", "robot", "points", "places", "closed", "name", "path", ...Object.keys(values), ...Object.keys(OPTIONS)];
   const unknown = [...parts.keys()].find((key) => !known.includes(key));
   if (parts.get("v") !== String(VERSION)) throw new Error("it is of another version of this page");
   if (unknown !== undefined) throw new Error(`it has an unknown part, ${unknown}`);
+  if (locked && ["robot", ...Object.keys(values)].some((key) => parts.has(key))) throw new Error("it is of another robot");
   if ([...parts.values()].join("").includes("\ufffd")) throw new Error("it is cut off or damaged");
   for (const { key, optional } of FIELDS) if (parts.has(key)) values[key] = number(key, parts.get(key), optional);
   for (const [key, standard] of Object.entries(OPTIONS)) {

@@ -14,6 +14,7 @@ from planner.jobs.plan import make_plan
 from planner.paths.path import Path2D, circle, polygon
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
+from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.tracked_point import Point, TrackedVehicle
 from planner.vehicle.vehicle import Mode, Vehicle
 from sim.model.presets import PRESETS
@@ -82,6 +83,18 @@ VEHICLES = {
     "with a long memory": vehicle(memory=3.0),
     "in a current": _in_a_current(),
 }
+
+
+MEASURED_VEHICLES = {
+    "exact": MeasuredVehicle(speed=0.25, turn_left=0.7, turn_right=0.6),
+    "slipping": MeasuredVehicle(
+        speed=(0.02, 4e-4), turn_left=(0.25, 0.01), turn_right=(0.2, 0.01), slip=(0.4, 0.02), lag=(0.8, 0.1)
+    ),
+    "with a body": MeasuredVehicle(
+        speed=(0.25, 5e-3), turn_left=(0.7, 0.02), turn_right=(0.6, 0.02), slip=(0.1, 0.02), lag=(0.05, 0.1),
+        name="it's a car", length=0.3, width=0.18,
+    ),
+}  # fmt: skip
 
 
 def tracked_of(car: Vehicle, offset: float = 0.0) -> TrackedVehicle:

@@ -22,10 +22,11 @@ import pytest
 
 from common.errors import InputError
 from planner.page.constants import constants_module
-from planner.page.first_state import robot_fields
+from planner.page.first_state import robot_fields, vehicle_fields
 from planner.page.write_page import table_data
 from planner.paths.tractrix import Reference
 from planner.planning.plan import Plan
+from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.vehicle import Vehicle
 from sim.model.robot import Robot
@@ -162,6 +163,8 @@ def to_page(value: Any) -> Any:
     if isinstance(value, Robot):
         own = {"timeScale": value.time_scale, "omegaBar": value.omega_bar, "sigmas": _named(value.sigmas)}
         return to_page({**robot_fields(value), **own})
+    if isinstance(value, MeasuredVehicle):
+        return to_page(vehicle_fields(value))
     if isinstance(value, Vehicle):
         tables = {name: list(map(typed, getattr(value, name))) for name in ("lag", "rest", "spread")}
         modes = [{"name": mode.name, "twist": mode.twist, "current": mode.current,

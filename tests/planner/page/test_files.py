@@ -20,16 +20,18 @@ from common.units import Sigma
 from planner.files.headers import schedule_template
 from planner.files.plan_files import write_plan
 from planner.files.saved_plan import load_plan, restore_plan
+from planner.jobs.plan import plan
 from planner.page.first_state import first_options, slider_ends
 from planner.paths.path import circle, shape_of
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
+from planner.vehicle.measured import MeasuredVehicle
 from sim.inputs import load_robot
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.robot_toml import robot_toml
 from sim.model.schedule import plan_id
-from tests.planner.page.cases import CONTROL, PATHS, followed, shipped
+from tests.planner.page.cases import CONTROL, MEASURED_VEHICLES, PATHS, followed, shipped
 from tests.planner.page.page_core import (
     TABLE,
     answer,
@@ -74,6 +76,39 @@ def test_files_of_a_plan_differ_by_rounding_alone(name: str, tmp_path: Path) -> 
         check_header(text, (tmp_path / file).read_text(encoding="utf-8"), 1e-9)
     Path("plan.json").write_text(found["plan.json"], encoding="utf-8")
     assert load_plan(Path("plan.json"))["id"] == result.to_dict()["id"]
+
+
+def test_files_of_a_measured_vehicle_are_those_of_the_command(tmp_path: Path) -> None:
+    car = MEASURED_VEHICLES["with a body"]
+    result = plan(circle(2.0), car, objective="flips")
+    write_plan(result, tmp_path)
+    swims = call("measured_vehicle.js", "trackedMeasured", car, "head_centre")
+    made = call("plan.js", "makePlan", result.drawn, swims, call("plan.js", "planRequest", {"objective": "flips"}))
+    found = answer("plan_files.js", "planFiles", made, PARTS)
+    ours, theirs = (json.loads(text) for text in (found["plan.json"], (tmp_path / "plan.json").read_text()))
+    assert (list(ours), list(ours["robot"])) == (list(theirs), list(theirs["robot"]))
+    assert ours["robot"] == theirs["robot"]
+    for name in ("dwell_bar", "predicted_poses", "stated_error_over_l", "feedback_error_over_l"):
+        check_near(ours[name], theirs[name], 1e-8)
+    csv = found["plan.csv"].split(",p")[0]  # up to the plan's identity
+    assert csv == (tmp_path / "plan.csv").read_text().split(",p")[0]
+    header = (tmp_path / "schedule.h").read_text().split("\n", 1)[1]
+    check_header(found["schedule.h"].split("\n", 1)[1], header, 1e-8)
+    Path("plan.json").write_text(found["plan.json"], encoding="utf-8")
+    assert restore_plan(Path("plan.json")).robot == car
+
+
+@pytest.mark.parametrize("name", MEASURED_VEHICLES)
+def test_a_vehicle_of_the_page_is_read_back_and_is_no_robot(name: str) -> None:
+    car = MEASURED_VEHICLES[name]
+    text = answer("measured_vehicle.js", "vehicleToml", car)
+    Path("car.toml").write_text(text, encoding="utf-8")
+    read = MeasuredVehicle.load("car.toml")
+    assert read.to_dict() == car.to_dict()
+    refusal = str(opened("car.toml", text))
+    assert refusal.startswith(
+        "car.toml is a measured vehicle; make a page of it: softflagella page --robot car.toml"
+    )
 
 
 def test_warnings() -> None:

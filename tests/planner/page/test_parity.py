@@ -25,6 +25,7 @@ from planner.planning.conditions import BlockedError
 from planner.planning.plan import Plan
 from planner.planning.request import PlanRequest
 from planner.vehicle.from_table import table_vehicle
+from planner.vehicle.measured import MeasuredVehicle
 from planner.vehicle.tracked_point import tracked_vehicle
 from sim.inputs import load_robot
 from sim.model.response import BEFORE
@@ -34,6 +35,7 @@ from tests.oracles.unseen_robots import lab_path, lab_robot
 from tests.planner.page.cases import (
     CONTROL,
     MEASURED,
+    MEASURED_VEHICLES,
     PATHS,
     TRIANGLE,
     VEHICLES,
@@ -66,10 +68,10 @@ SHORT = {"objective": "flips"}
 
 
 class ParityCase(NamedTuple):
-    """A path, who follows it and how; a robot, or the name of one of VEHICLES with the offset of its point."""
+    """A path, who follows it and how: a robot, a measured vehicle, or one of VEHICLES with its point's offset."""
 
     path: Path2D
-    robot: Robot | tuple[str, float] = CONTROL
+    robot: Robot | MeasuredVehicle | tuple[str, float] = CONTROL
     options: dict[str, Any] = SHORT
 
 
@@ -116,7 +118,7 @@ def random_case(seed: int) -> ParityCase:
     """Draw a path and a robot as labs have them."""
     rng = np.random.default_rng(seed)
     options = {"objective": ("error", "time", "flips")[seed % 3], "corner": ("nearest", "minimax")[seed % 2]}
-    return ParityCase(lab_path(rng), lab_robot(rng), options)
+    return ParityCase(lab_path(rng)[1], lab_robot(rng), options)
 
 
 CASES: dict[str, Callable[[], ParityCase]] = {
@@ -128,6 +130,9 @@ CASES: dict[str, Callable[[], ParityCase]] = {
     "in a current": lambda: ParityCase(polygon(6, 4.0), ("in a current", 0.1), {**SHORT, "corner": "fillet"}),
     "minimax": lambda: ParityCase(SQUARE, ("symmetric", 0.0),
                             {"objective": "flips", "tolerance": 0.1, "corner": "minimax"}),
+    "measured, exact": lambda: ParityCase(SQUARE, MEASURED_VEHICLES["exact"], {"objective": "time"}),
+    "measured, slipping": lambda: ParityCase(circle(2.0), MEASURED_VEHICLES["slipping"], {}),
+    "measured, front": lambda: ParityCase(BEND, MEASURED_VEHICLES["with a body"], {"point": "head_tip"}),
     "bend, pivot": lambda: ParityCase(BEND, CONTROL, {**SHORT, "point": "pivot"}),
     "rounded, pivot": lambda: ParityCase(SQUARE, CONTROL, {**SHORT, "point": "pivot", "corner": "fillet"}),
     "own circle": lambda: ParityCase(circle(0.95), CONTROL, SHORT),
@@ -152,7 +157,7 @@ CASES: dict[str, Callable[[], ParityCase]] = {
     "star": lambda: ParityCase(PATHS["star"], MEASURED, {"objective": "flips", "time_weight": 0.05}),
     "long dwells": lambda: ParityCase(PATHS["eight"].scaled(2), TRIANGLE, {"minimum_seconds": 3.0}),
 }  # fmt: skip
-QUICK = 14  # cases of `make test`; the others run with the rates
+QUICK = 17  # cases of `make test`; the others run with the rates
 CASE_MARKS = [pytest.param(name, marks=[] if i < QUICK else pytest.mark.rates) for i, name in enumerate(CASES)]
 ERRORS = {"stated": "stated", "guaranteed": "guaranteed", "predicted_rms": "predictedRms",
           "predicted_max": "predictedMax", "drawn_rms": "drawnRms", "drawn_max": "drawnMax"}  # fmt: skip
@@ -187,20 +192,27 @@ def difference(found: dict[str, Any], wanted: dict[str, Any]) -> float:
     return worst
 
 
+def page_vehicle(robot: Robot | MeasuredVehicle, point: str = "head_centre") -> dict[str, Any]:
+    """Return what stands for the page's vehicle with its tracked point."""
+    if isinstance(robot, MeasuredVehicle):
+        return call("measured_vehicle.js", "trackedMeasured", robot, point)
+    return call("from_table.js", "trackedVehicle", robot, TABLE, point)
+
+
 def plan_call(case: ParityCase) -> tuple[Any, ...]:
     path, robot, options = case
-    request = call("plan.js", "planRequest", page_options(options))
-    if isinstance(robot, Robot):
-        point = options.get("point", "head_centre")
-        return "plan.js", "makePlan", path, call("from_table.js", "trackedVehicle", robot, TABLE, point), request
-    return "plan.js", "makePlan", path, tracked_of(VEHICLES[robot[0]], robot[1]), request
+    if isinstance(robot, tuple):
+        swims = tracked_of(VEHICLES[robot[0]], robot[1])
+    else:
+        swims = page_vehicle(robot, options.get("point", "head_centre"))
+    return "plan.js", "makePlan", path, swims, call("plan.js", "planRequest", page_options(options))
 
 
 def python_plan(case: ParityCase) -> Plan:
     path, robot, options = case
-    if isinstance(robot, Robot):
-        return plan(path, robot, lookup=shipped(), **options)
-    return make_plan(path, tracked_of(VEHICLES[robot[0]], robot[1]), PlanRequest(**options))
+    if isinstance(robot, tuple):
+        return make_plan(path, tracked_of(VEHICLES[robot[0]], robot[1]), PlanRequest(**options))
+    return plan(path, robot, lookup=shipped() if isinstance(robot, Robot) else None, **options)
 
 
 @pytest.mark.parametrize("name", CASE_MARKS)
@@ -310,13 +322,9 @@ def page_space(regions: Sequence[Circle | Polygon], walls: Polygon | None) -> di
     }
 
 
-def goal_call(start: Pose, goal: Pose, robot: Robot | str, **options: Any) -> tuple[Any, ...]:
+def goal_call(start: Pose, goal: Pose, robot: Robot | MeasuredVehicle | str, **options: Any) -> tuple[Any, ...]:
     request = call("plan.js", "planRequest", {"start": start, "goal": goal, "objective": "time", **options})
-    swims = (
-        call("from_table.js", "trackedVehicle", robot, TABLE, "head_centre")
-        if isinstance(robot, Robot)
-        else tracked_of(VEHICLES[robot])
-    )
+    swims = tracked_of(VEHICLES[robot]) if isinstance(robot, str) else page_vehicle(robot)
     return "plan.js", "makePlan", None, swims, request
 
 
@@ -355,6 +363,30 @@ def test_a_goal_without_regions_is_reached_as_by_the_command(robot: str) -> None
     (found,) = answers([goal_call(start, goal, robot)], left_out=["vehicle"])
     wanted = to_goal(start, goal, tracked_of(VEHICLES[robot]))
     assert difference(numbers_of_page(found), numbers(wanted)) <= ALIKE
+
+
+def test_a_measured_vehicle_leads_its_body_around_a_region_as_by_the_command() -> None:
+    car = replace(MEASURED_VEHICLES["with a body"], turn_left=(0.7, 0.005), turn_right=0.6, slip=0.1, lag=0.05)
+    regions = (Circle(3.0, 0.0, 0.4), Polygon.of([[3, 2], [4, 2], [4, 3]]))
+    start, goal = (0.0, 0.0, 0.0), (6.0, 0.5, 0.3)
+    (found,) = answers([goal_call(start, goal, car, space=page_space(regions, None))], left_out=["vehicle"])
+    wanted = to_goal(start, goal, car, keep_out=regions)
+    assert difference(numbers_of_page(found), numbers(wanted)) <= ALIKE
+    assert found["clear"]["clearance"] == pytest.approx(wanted.kept_clear.clearance, abs=1e-8)  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("name", MEASURED_VEHICLES)
+def test_what_moves_a_measured_vehicle_and_what_is_uncertain_of_it(name: str) -> None:
+    car = MEASURED_VEHICLES[name]
+    found, wanted = answer("measured_vehicle.js", "trackedMeasured", car, "pivot"), car.motion()
+    assert found["offset"] == pytest.approx(-wanted.pivot_distance)
+    moves = found["vehicle"]
+    for part in ("twist", "lag", "rest", "spread"):
+        check_near(np.reshape(moves[part], np.shape(getattr(wanted, part))), getattr(wanted, part))
+    assert [mode["name"] for mode in moves["modes"]] == [mode.name for mode in wanted.modes]
+    for mode, other in zip(moves["modes"], wanted.modes, strict=True):
+        check_near(mode["twist"], other.twist)
+        check_near(np.reshape(mode["lag"], wanted.lag.shape), other.lag)
 
 
 ROOM = Polygon.of([[-1, -2], [4.5, -2], [4.5, 2], [-1, 2]])

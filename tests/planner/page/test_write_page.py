@@ -16,7 +16,7 @@ import pytest
 
 import planner.page.bundle
 import softflagella as sf
-from common.errors import run_command
+from common.errors import InputError, run_command
 from planner.page.bundle import joined, read_module
 from planner.page.constants import constants
 from planner.vehicle.from_table import both_directions
@@ -83,6 +83,52 @@ def test_of_a_table_without_errors_of_the_response_the_vehicle_is_written(tmp_pa
     errors = lookup.error_modes(both_directions(robot.group_values())).twist
     assert len(data["planner"]["table"]["vehicle"]["errors"]) == len(errors)
     assert page.stat().st_size < 0.52e6
+
+
+BUGGY = sf.Vehicle(
+    speed=(0.25, 0.005), turn_left=(0.7, 0.02), turn_right=(0.6, 0.02), lag=0.2, name="buggy & <co>"
+)
+
+
+def test_the_page_of_a_measured_vehicle_has_its_numbers_and_no_look_up_table(tmp_path: Path) -> None:
+    page = sf.write_page(tmp_path / "page.html", BUGGY, paths=["circle:90cm"])
+    data, wanted = data_of(page), sf.plan("circle:90cm", BUGGY)
+    (robot,) = data["robots"]
+    assert dict(robot["fields"]["measured"]) == BUGGY.to_dict()
+    assert data["planner"]["table"] is None
+    assert (data["limits"], data["locked"]["name"]) == ({}, BUGGY.name)
+    assert data["first"]["plan"]["stated"] == pytest.approx(100 * BUGGY.length_scale * wanted.stated_error)
+    assert "Vehicle buggy &amp; &lt;co&gt;." in page.read_text()
+    assert page.stat().st_size < 0.25e6
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("speed_cm_s = fast", "Invalid value (at line 2"),
+        ("speed_cm_s = 0", "speed = 0 ± 0; give a number above 0"),
+        ("speed_cm = 3", "speed_cm is no line of a vehicle"),
+        ("", "turn_left_deg_s is in no table"),
+    ],
+)
+def test_a_damaged_vehicle_is_refused_in_one_line(
+    line: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run_command(main, ["robot", "vehicle", "--out", "vehicle.toml"]) == 0
+    lines = Path("vehicle.toml").read_text().splitlines()
+    damaged = [line if each.startswith("speed") else each for each in lines]
+    Path("vehicle.toml").write_text("\n".join(damaged))
+    capsys.readouterr()
+    assert run_command(main, ["page", "--robot", "vehicle.toml", "--out", "page.html"]) == 2
+    (refusal,) = capsys.readouterr().err.splitlines()
+    assert words in refusal
+    assert not Path("page.html").exists()
+
+
+def test_a_vehicle_has_no_options_of_a_look_up_table(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="is a measured vehicle; it needs no look-up table"):
+        sf.write_page(tmp_path / "page.html", BUGGY, own_table=True)
 
 
 def test_bad_input_ends_in_one_line_and_leaves_no_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -25,7 +25,7 @@ from sim.inputs import load_robot
 from sim.model.presets import PRESETS
 from sim.model.robot_toml import robot_toml
 from softflagella.__main__ import main
-from tests.planner.page.cases import TRIANGLE, shipped, table_of_runs
+from tests.planner.page.cases import MEASURED_VEHICLES, TRIANGLE, shipped, table_of_runs
 from tests.planner.page.page_core import check_header
 from tests.planner.page.view.browser import (
     FIRST_SCREEN,
@@ -464,3 +464,34 @@ def test_a_locked_robot_is_planned_for_as_by_the_command(browser: Any, tmp_path:
     theirs = plan(circle(22.0).scaled(0.01 / 0.11), robot, lookup=table, objective="flips").to_dict()
     del ours["code_version"]
     check_plans(ours, theirs)
+
+
+def test_a_measured_vehicle_is_shown_with_its_numbers_and_planned_for_as_by_the_command(
+    browser: Any, tmp_path: Path
+) -> None:
+    car = MEASURED_VEHICLES["with a body"]
+    path = write_page(tmp_path / "page.html", car, objective="flips", paths=["circle:80cm"])
+    (tmp_path / "robot.toml").write_text(robot_toml(CONTROL))
+    table_of_runs().to_csv(tmp_path / "table.csv", index=False)
+    with opened_page(browser, path.as_uri()) as page:
+        assert "dwells: 95 of 100" in planned(page)
+        assert (text_of(page, "#robot-title"), text_of(page, ".legend li:nth-child(3)")) == ("Vehicle", "left")
+        for words in ("it's a car", "25 ± 0.5 cm/s", "40.107 ± 1.15 degrees/s", "0.05 ± 0.1 s", "30 × 18 cm"):
+            assert words in text_of(page, "#motion")
+        for part in ("#robot-fields", "#or-runs", "#problem", "#robot-problem"):
+            assert not page.is_visible(part)
+        names = ("plan.json", "plan.csv", "schedule.h", "path.csv", "vehicle.toml")
+        files = {name: saved(page, name, tmp_path) for name in names}
+        drop(page, tmp_path / "robot.toml")
+        page.locator(
+            "#robot-problem", has_text="this page plans for it's a car alone; make a page of robot.toml"
+        ).wait_for()
+        drop(page, tmp_path / "table.csv")
+        page.locator("#runs-problem", has_text="this page has one vehicle alone").wait_for()
+    words = ["plan", str(files["path.csv"]), "--robot", str(files["vehicle.toml"]), "--objective", "flips"]
+    assert run_command(main, [*words, "--out", str(tmp_path / "out")]) == 0
+    theirs = {name: (tmp_path / "out" / name).read_text() for name in names[:3]}
+    check_plans(json.loads(files["plan.json"].read_text()), json.loads(theirs["plan.json"]))
+    assert files["plan.csv"].read_text().split(",p")[0] == theirs["plan.csv"].split(",p")[0]
+    ours = files["schedule.h"].read_text().split("\n", 1)  # below the line with the plan's identity
+    check_header(ours[1], theirs["schedule.h"].split("\n", 1)[1], 1e-9)

@@ -68,6 +68,15 @@ def test_an_unknown_or_broken_address_gives_the_first_state_and_says_so() -> Non
     assert "it has an unknown shape, squre (is it square?)" in read[-1]["problem"]
 
 
+@pytest.mark.parametrize("link", ["v=1&robot=mine", "v=1&viscosity=2"])
+def test_a_link_of_another_robot_is_refused_where_the_robot_is_locked(link: str) -> None:
+    initial = first()
+    assert answer("view/state.js", "fromAddress", link, initial, SHAPES)["problem"] == ""
+    read = answer("view/state.js", "fromAddress", link, initial, SHAPES, True)
+    assert read["state"] == initial
+    assert "it is of another robot" in read["problem"]
+
+
 def test_a_zoom_keeps_the_place_under_the_pointer() -> None:
     place = answer("view/scene.js", "placeAt", VIEW, 40, 70)
     check_near(answer("view/scene.js", "pixelOf", VIEW, place), [40, 70])
