@@ -214,7 +214,9 @@ def _adopted(form: Hypothesis, alike: Sequence[Hypothesis], runs: Runs) -> dict[
         "spread": evidence.spread,
         "scale": "logarithm" if form.logarithmic else "as it is",
         "sizes": {name: list(size) for name, size in evidence.sizes.items()},
-        "sizes_of": "specimens" if runs.trace is None or runs.specimen is not None else "sessions of traces",
+        "sizes_of": "specimens"
+        if runs.specimen is not None
+        else f"sessions{' of traces' * (runs.trace is not None)}",
         "removed_share": min(evidence.removed or 0.0, 1.0),
         "session_gain": [evidence.paired.gain, evidence.paired.error],
         "birge": evidence.birge,
@@ -224,6 +226,12 @@ def _adopted(form: Hypothesis, alike: Sequence[Hypothesis], runs: Runs) -> dict[
         "as_well": [other.title for other in alike if other.fit is not form.fit],
         "at_theory": form.at_theory,
     }
+
+
+def _specimens_in_words(runs: Runs) -> str:
+    if runs.specimen is not None:
+        return "specimens"
+    return "sessions" if runs.trace is None else "sessions of traces"
 
 
 def _withdrawn(claim: Hypothesis) -> dict[str, Any]:

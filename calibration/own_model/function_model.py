@@ -29,6 +29,7 @@ from common.errors import InputError
 
 _KEPT = 16  # predictions
 _NEXT = "next"  # session that can be made
+_SPECIMEN = "specimen"  # of a run that can be made
 NOT_ABOVE_0 = np.log(1e-300)  # stands for the logarithm of what is not above 0
 
 
@@ -252,19 +253,27 @@ class FunctionModel:
         return start
 
     def possible(self) -> tuple[FunctionModel, list[dict[str, Any]]]:
-        """Return a run for each of the table's conditions, with what the lab can set, named by its columns."""
+        """Return a run for each of the table's conditions, with what the lab can set, named by its columns.
+
+        Where specimens have numbers of their own, there is one of each specimen.
+        """
         if self.runs.trace is not None:
             return self._possible_traces()
+        names = [name.removeprefix("ln ") for name in self.runs.input_names]
         first = np.unique(self.runs.condition, return_index=True)[1]
         table = pd.DataFrame({name: values[first] for name, values in self.columns.items()}).assign(row=first)
+        if any(number.per == "specimen" for number in self.model.numbers):
+            number, known = self.runs.groups("specimen")
+            table[_SPECIMEN] = [known[place] for place in number[first].tolist()]
+            names = [_SPECIMEN, *names]
         for name, own in self.own.items():
             table = table.drop(columns=name).merge(pd.Series(own, name=name, dtype=float), how="cross")
-        table = table.drop_duplicates(names := [name.removeprefix("ln ") for name in self.runs.input_names])
-        runs = replace(self.runs.subset(table.pop("row").to_numpy()), condition=np.arange(len(table)))
-        if not any(number.per == "session" for number in self.model.numbers):
-            runs = replace(runs, session=np.zeros(len(runs), dtype=np.int64), session_names=(_NEXT,))
+        table = table.drop_duplicates(names)
+        settings = [dict(zip(names, row, strict=True)) for row in table[names].itertuples(index=False, name=None)]
+        session = {"session": np.zeros(len(table), dtype=np.int64), "session_names": (_NEXT,)}
+        runs = self.runs.subset(table.pop("row").to_numpy())
+        runs = replace(runs, condition=np.arange(len(table)), **session)
         values = {name: table[name].to_numpy().astype(old.dtype) for name, old in self.columns.items()}
-        settings = [{name: values[name][row].item() for name in names} for row in range(len(runs))]
         return replace(self, runs=runs, columns=AskedColumns(values, self.columns.asked), known={}), settings
 
     def _possible_traces(self) -> tuple[FunctionModel, list[dict[str, Any]]]:

@@ -185,10 +185,13 @@ def _by_trace(known: dict[str, Any]) -> dict[str, Any]:
 
 
 def _heads(model: Model, known: Mapping[str, Any]) -> Flags | None:
-    """Say which runs are the first of those that have numbers of their own, (n,); None without such numbers."""
-    groups = [known[number.per] for number in model.numbers if number.per]
+    """Say which runs are the first of those that have numbers of their own, (n,); None without such numbers.
+
+    They are the first of each trace, where there are traces, whether a number is that of a trace or of many.
+    """
+    groups = {number.per: known["trace" if model.time else number.per] for number in model.numbers if number.per}
     heads = np.zeros(len(known["rows"]), dtype=bool)
-    for group in groups:
+    for group in groups.values():
         for kind in np.unique(group):
             rows = np.flatnonzero(group == kind)
             heads[rows[: max(FEWEST_READINGS, math.ceil(_HEAD * len(rows)))]] = True
@@ -206,7 +209,9 @@ def _advice(model: FunctionModel, roles: Roles) -> list[str]:
         advice.append(f"no session was given; column {free[0]} looks like one (--session {free[0]})")
     if runs.trace is not None or runs.repeated(slice(None)) or runs.sigma is not None or not runs.noise_known:
         return advice
-    advice.append('without repeats the noise is unknown; declare it: sigma="2 %" of the Output, or noise=')
+    advice.append(
+        f'with fewer than {FEWEST_REPEATS} repeats the noise is unknown; declare it: sigma="2 %" of the Output'
+    )
     for role in ("specimen", "session"):
         if name := getattr(roles, role):
             others = [column for column in settings if column != name]

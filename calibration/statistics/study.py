@@ -27,6 +27,7 @@ from calibration.statistics.statistical_model import ForwardModel, Parameter, re
 from calibration.table.excluded import Excluded
 from calibration.table.runs import Runs
 from common.arrays import Flags, Floats, Integers
+from common.errors import InputError
 
 LEVEL = 0.04  # α of every claim; below 0.05, because the noise is estimated and false claims must stay below 5 %
 DRAWS = 1000  # of the bootstrap
@@ -120,10 +121,13 @@ def groups(data: Runs) -> tuple[Integers, tuple[str, ...]]:
 def middle_session(data: Runs) -> Flags:
     """Choose the middle session by name, which needs no extrapolation, or a block if sessions are few; (n,).
 
-    Its neighbours join it until `_HELD_OUT` of the runs are held out, where sessions are short.
+    Its neighbours join it until `_HELD_OUT` of the runs are held out, where sessions are short. A session all of
+    which would serve to fit its own numbers is none that can be held out.
     """
     group, names = groups(data)
-    by_distance = sorted(range(len(names)), key=lambda place: abs(place - len(names) // 2))
+    spent = set(group.tolist()) - set(group[data.left_out(np.ones(len(data), dtype=bool))].tolist())
+    every = [place for place in range(len(names)) if place not in spent]
+    by_distance = sorted(every, key=lambda place: abs(place - len(names) // 2))
     sizes = np.bincount(group, minlength=len(names))[by_distance]
     count = int(np.searchsorted(np.cumsum(sizes), _HELD_OUT * len(group) - 0.5)) + 1
     return np.isin(group, by_distance[:count])
@@ -137,6 +141,11 @@ def split_runs(data: Runs, held_out: Flags | None, outliers: tuple[Flags, tuple[
         outliers: which they are (n,), and why; neither fitted nor tested.
     """
     held_out = middle_session(data) if held_out is None else held_out
+    if held_out.any() and not data.left_out(held_out).any():
+        raise InputError(
+            f"the {data.row}s that are held out all serve to fit the numbers of their own, so none is left to "
+            "compare; hold out others, or more"
+        )
     count = len(data.session_names)
     parted = divided(data, held_out)
     group, names = data.parts or (groups(data) if parted else (data.session, data.session_names))

@@ -109,7 +109,7 @@ class TableReader:
     def _set_aside_copies(self, inputs: Floats, outputs: Floats) -> None:
         """Set aside the usable rows with all outputs (n, k) that are copies of an earlier one."""
         whole = np.flatnonzero(self.faultless & np.isfinite(outputs).all(axis=1))
-        rows = self.table.iloc[whole].astype(str)
+        rows = self.table.iloc[whole].astype(str).reset_index(drop=True)
         number = rows.groupby([*rows], sort=False, dropna=False).ngroup()
         copies = pasted(number.to_numpy().astype(np.int64), inputs[whole])
         places = np.setdiff1d(np.arange(len(whole)), list(copies))

@@ -35,6 +35,7 @@ from calibration.attribution.wrong_numbers import pulls
 from calibration.findings.findings import Description, Findings
 from calibration.findings.held_out import HeldOutErrors, held_out_errors
 from calibration.findings.next_runs import Explanation, next_runs
+from calibration.linear.gls import repeat_count
 from calibration.statistics.budget import Work, beginning, limited, skipped
 from calibration.statistics.checks import predict_as_given
 from calibration.statistics.fit import (
@@ -66,6 +67,7 @@ from calibration.statistics.weights import (
     rows_of_little_weight,
 )
 from calibration.table.excluded import caveat_of_excluded
+from calibration.table.runs import FEWEST_REPEATS
 from calibration.table.unit_slips import refuse_unit_slips
 from calibration.verdict.describe import adopt_in_turns, forms_in_question
 from calibration.verdict.explain import explain_and_refute, fit_moves
@@ -77,6 +79,7 @@ from common.provenance import fingerprint
 V = TypeVar("V", bound=Verdict)
 Intervals = dict[str, tuple[float, float]]
 _SEARCH, _DESCRIBED = 0.6, 0.85  # shares of the limit after which no effects and no descriptions are looked for
+_TOLD = 3  # single readings
 _LAWS_TOLD_APART = 3  # beside a claim; the more there are, the fewer runs tell all of them apart
 
 
@@ -301,6 +304,12 @@ def _errors(
     return held_out_errors(study, predictions, base, final)
 
 
+def _listed(far: list[str]) -> str:
+    """List the first of some readings, and say how many others there are."""
+    others = f"; and {len(far) - _TOLD} others" if len(far) > _TOLD else ""
+    return f"{'; '.join(far[:_TOLD])}{others}"
+
+
 def _caveats(findings: Findings, model: ForwardModel, ended: Mapping[str, str], beside: str) -> tuple[str, ...]:
     """Say what weakens the conclusion: what was left out or not tried, and why a fit may not be the best one."""
     runs, split, base, final = findings.runs, findings.split, findings.base, findings.final
@@ -316,7 +325,13 @@ def _caveats(findings: Findings, model: ForwardModel, ended: Mapping[str, str], 
         if is_free_logarithm(p) and final.half_width(index) > math.log(2) and p not in held
     ]
     outside = not coefficients_within_range(model, base.parameters)
+    repeats = repeat_count(runs.repeat_ids[split.fitted])
     unknown = "there are neither repeats nor a declared noise, so no residual can be told from noise"
+    if repeats:
+        unknown = (
+            f"{repeats} of the {runs.row}s that are fitted are repeats, and without a declared noise "
+            f"{FEWEST_REPEATS} are needed to tell a residual from noise"
+        )
     if runs.trace is not None:
         unknown = (
             "no two traces have the same settings and times, so the memory of the noise is unknown, and no "
@@ -337,6 +352,6 @@ def _caveats(findings: Findings, model: ForwardModel, ended: Mapping[str, str], 
         *([not_tried] if ended else []),
         *caveat_of_weights(little, int(split.kept.sum()), alike(runs, little)),
         *(f"{p.title} ({p.name}) is held at the end of its range, {final.parameters[p.name]:g}" for p in held),
-        *([f"look at single readings again: {'; '.join(far)}"] if far else []),
+        *([f"look at single readings again: {_listed(far)}"] if far else []),
         *(words for holds, words in of_fits if holds),
     )

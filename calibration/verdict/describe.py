@@ -8,7 +8,7 @@ from dataclasses import replace
 from calibration.attribution.attribution import Attribution, LoopTurn
 from calibration.attribution.effects import scored
 from calibration.attribution.forms import forms_of_claims
-from calibration.attribution.hypothesis import Hypothesis, Reason
+from calibration.attribution.hypothesis import Hypothesis, Origin, Reason
 from calibration.attribution.left_out import paired_gain
 from calibration.attribution.nearest import adopt_nearest, largest_along
 from calibration.findings.held_out import tested_on_held_out
@@ -38,7 +38,7 @@ def adopt_in_turns(study: Study, attribution: Attribution) -> Attribution:
             attribution = replace(attribution, candidates=tuple(seen.values()))
             if not runs.noise_known:
                 first, form, alike = _nearest_pair(study, base, candidates, form, alike)
-        if form is None:
+        if form is None or (not runs.noise_known and _beside_others_at_an_end(study, form)):
             break
         claimed = replace(form, added=(*(first.added if first else ()), form.effect))
         index = next(i for i, e in enumerate(study.effects) if e.name == form.effect.name)
@@ -64,6 +64,12 @@ def adopt_in_turns(study: Study, attribution: Attribution) -> Attribution:
         tangents = directions(study.model, base.parameters, study.effects)
         candidates = tuple(scored(misfit, base, study.effects, misfit.critical_z))
     return replace(attribution, turns=tuple(turns) if attribution.nearest else (), withdrawn=withdrawn)
+
+
+def _beside_others_at_an_end(study: Study, form: Hypothesis) -> bool:
+    """Tell whether the fit with a form has other effects, too, and holds any of them at an end of its range."""
+    every = tuple(e for e in study.model.effects if e.name in form.fitted.names)
+    return len(every) > 1 and Hypothesis(Origin.FORM, every, form.fitted).at_an_end
 
 
 def _turn(study: Study, fitted: Fit, named: str, left: str) -> LoopTurn:

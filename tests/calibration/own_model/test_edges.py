@@ -147,6 +147,14 @@ def test_without_a_declared_noise_the_same_forms_are_named(seed: int) -> None:
     assert conditions.after < conditions.before
 
 
+def test_a_pair_of_forms_is_none_where_one_of_them_is_at_the_end_of_its_range() -> None:
+    """Of an unknown noise: the other one takes what is left, and everything comes out wrong."""
+    narrow = [replace(effect, high=0.5) if effect.name == "hot" else effect for effect in mug().effects]
+    table = cooled(seed=2, hot=3.0, mug=4.0)
+    verdict = sf.calibrate(table, replace(mug(), effects=narrow), progress=False)
+    assert len(named(verdict)) < 2
+
+
 def diode(columns: Columns, p: Mapping[str, float]) -> dict[str, Any]:
     """Compute the current of a diode in series with an ammeter, whose resistance may be in the reading."""
     current = p["saturation"] * np.expm1(columns["volts_V"] / 0.05)

@@ -245,7 +245,7 @@ def test_what_would_make_rows_repeats_is_said() -> None:
     assert "no session was given; column day looks like one (--session day)" in caveats()
     assert "looks like" not in caveats(session="day")
     alone = caveats(session="day", specimen="ball")
-    assert 'declare it: sigma="2 %" of the Output, or noise=' in alone
+    assert 'fewer than 8 repeats the noise is unknown; declare it: sigma="2 %" of the Output' in alone
     assert "rows of equal settings differ in ball (--specimen), so they are no repeats" in alone
 
 
@@ -322,3 +322,11 @@ def test_a_fault_of_a_hand_made_model_is_named(changes: dict[str, Any], words: s
 
 def test_as_it_should_be_a_hand_made_model_is_calibrated() -> None:
     assert calibrate(hand_made(), progress=False, draws=200).effects == ("wall",)
+
+
+@pytest.mark.parametrize("name", ["line", "row", "session", "level_0"])
+def test_a_column_may_have_any_name(name: str, tmp_path: Path) -> None:
+    """The index of a table that was read has a name, too."""
+    model = replace(MODEL, function=lambda columns, p: fall({"d": columns[name]}, p))
+    TABLE.rename(columns={"d": name}).to_csv(tmp_path / "falls.csv", index=False)
+    assert name in read_runs_of(tmp_path / "falls.csv", model, Roles(session="round"))[0].runs.settings

@@ -351,3 +351,36 @@ def test_repeats_of_few_digits_may_be_equal(seed: int) -> None:
     table = pd.DataFrame({"d": diameters, "round": 1, "v": (3000 * diameters**2 * noise).round()})
     assert table.duplicated().sum() > 60
     assert len(runs_of(table)) == 180
+
+
+def test_runs_are_proposed_for_each_specimen_with_numbers_of_its_own() -> None:
+    """Both specimens at the same settings, and two effects that these cannot tell apart."""
+
+    def rate(columns: Any, p: Any) -> Any:
+        c = columns["conc"]
+        return {"rate": p["slope"] * c / (1 + p["saturation"] * c) * c ** -p["power"]}
+
+    model = sf.Model(
+        rate,
+        outputs={"rate": sf.Output("rate", sigma="10 %")},
+        numbers=[sf.Number("slope", 10, low=0.1, high=1e3, per="specimen")],
+        effects=[
+            sf.Effect("saturation", "saturation", low=0, high=50, typical=1),
+            sf.Effect("power", "power law", low=-1, high=1, typical=0.3),
+        ],
+    )
+    conc = np.tile([0.2, 0.4, 0.6, 1.1], 6)
+    cells, noise = np.repeat(["treated", "untreated"], 12), np.exp(0.1 * np.random.default_rng(3).normal(size=24))
+    slope = np.where(cells == "treated", 20.0, 12.0)
+    exact = rate({"conc": conc}, {"slope": slope, "saturation": 1.5, "power": 0.0})["rate"]
+    table = pd.DataFrame({"cells": cells, "conc": conc, "rate": exact * noise})
+    verdict = sf.calibrate(table, model, specimen="cells", progress=False, own={"conc": (0.05, 5.0)})
+    assert verdict.verdict == "ambiguous"
+    assert {run.settings["specimen"] for run in verdict.next_runs} <= {"treated", "untreated"}
+    possible, settings = read_runs_of(table, model, Roles(specimen="cells"), own={"conc": (0.05, 5.0)})[
+        0
+    ].possible()
+    assert {(s["specimen"], s["conc"]) for s in settings} == {
+        (name, value) for name in ("treated", "untreated") for value in (0.05, 5.0)
+    }
+    assert len(possible.runs) == len(settings) == 4

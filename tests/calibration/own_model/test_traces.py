@@ -9,6 +9,7 @@ import pytest
 from scipy.optimize import least_squares
 
 import softflagella as sf
+from calibration.own_model.table_of_runs import Roles, read_runs_of
 from common.errors import InputError
 from tests.oracles.cups import MODEL, RATE, cup, cups
 
@@ -209,3 +210,25 @@ def test_times_within_half_a_step_are_repeats_and_lengths_may_differ():
     verdict = sf.calibrate(shorter, MODEL, **TRACE)
     assert verdict.runs.noise_known
     assert len(verdict.runs.noise_of_traces.repeats) == 4
+
+
+def test_the_numbers_of_a_specimen_with_several_traces_leave_readings_to_compare():
+    """The first trace of a specimen is not all spent on its numbers."""
+    table = cups(5)
+    table["mug"] = "the only one"
+    own = replace(MODEL, numbers=[*MODEL.numbers, sf.Number("room", 1.0, low=-9, high=9, per="specimen")])
+    function = lambda columns, p: {"T": MODEL.function(columns, p)["T"] + 1e-3 * p["room"]}  # noqa: E731
+    model = replace(own, function=function)
+    heads = read_runs_of(table, model, Roles(trace="cup", specimen="mug"))[0].runs.heads
+    first = table[table["cup"] == table["cup"].min()]
+    assert 0 < heads[: len(first)].sum() < len(first) / 3
+    verdict = sf.calibrate(table, model, trace="cup", specimen="mug", held_out=table["cup"].min(), progress=False)
+    assert verdict.split.test.any()
+
+
+def test_held_out_readings_that_all_serve_a_fit_are_refused():
+    table = cups(5)
+    short = table[table["cup"] == table["cup"].min()].head(3)
+    others = table[table["cup"] != table["cup"].min()]
+    said = fault(pd.concat([short, others], ignore_index=True), held_out=table["cup"].min())
+    assert "none is left to compare; hold out others" in said
