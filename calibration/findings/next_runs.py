@@ -12,10 +12,11 @@ single runs the smallest counts. How often the runs decide is found by drawing t
 and Fedorov (1975).
 
 A swim or a trace is many rows, and has own numbers, such as its start, that are fitted to it alone. They are in J
-as well; in Cov they have a wide prior, or that of their tolerance.
+as well; in Cov they have a wide prior, or that of their tolerance. A trace that is made again has own ones again.
 
-A batch is chosen one run after the other; of swims and traces it is the best one. With equal odds the wrong one of
-two is chosen with the probability Φ(−√λ/2); the run is taken that makes the sum of these over all pairs least.
+A batch is chosen one run after the other; of swims it is the best one, of traces the best one and its repeats.
+With equal odds the wrong one of two is chosen with the probability Φ(−√λ/2); the run is taken that makes the sum
+of these over all pairs least.
 
 Each explanation was fitted before the new runs were made, and gives them a density: Gaussian about its prediction,
 with covariance Σ + J Cov Jᵀ, J Cov Jᵀ the error of its own fit. The ratio of two densities, of all new runs
@@ -55,7 +56,7 @@ _DRAWS = 4000
 _PROPOSED, _PROPOSED_WHOLE = 3, 15  # single settings; swims or traces
 _WANTED = 0.9  # share of draws that should decide
 _ENOUGH = 17.0  # λ at which they do
-_MOST_REPEATS = 16
+_REPEATS, _REPEATS_OF_TRACES = (1, 2, 4, 8, 16), (1, 2, 4)
 _MOST_RIVALS = 4
 _WIDE = 1e3  # standard deviation of a number of new runs' own without a tolerance, in typical sizes or logarithms
 _PASSES = 3  # of a fit of these numbers
@@ -112,13 +113,14 @@ class Pair(NamedTuple):
     difference: Floats  # of their predictions, (m, k)
     J: Floats  # (m, k, p) derivatives of the wrong one
     covariance: Floats  # (p, p) of its fit, see `_with_own`
+    own: int = 0  # of the p, how many are the new runs' own; they come last
 
 
 def next_runs(rivals: Sequence[Hypothesis], *, seed: int = 0) -> tuple[tuple[NextRun, ...], Batch]:
     """Find the best experiments to tell (the first four) rivals apart, best first, and the best `BATCH` runs.
 
     Of experiments of several rows, swims or traces, more are listed, the cheapest first of those that decide in
-    `_WANTED` of cases. None is repeated, and the batch is the best one.
+    `_WANTED` of cases, and the batch is the first one. Swims are not repeated.
 
     Raises:
         InputError: a run cannot be simulated; of swims none can.
@@ -133,9 +135,9 @@ def next_runs(rivals: Sequence[Hypothesis], *, seed: int = 0) -> tuple[tuple[Nex
         model, before = possible[id(rival.model)][0], Explanation.of(rival)
         names, covariance = _with_own(model, before)
         at = {**start_values(model), **fit.parameters}
-        sides.append((*derivatives(model, at, names), covariance))
+        sides.append((*derivatives(model, at, names), covariance, len(names) - len(before.parameters)))
     pairs = [Pair(true[0] - wrong[0], *wrong[1:]) for true, wrong in itertools.permutations(sides, 2)]
-    solved = np.array([np.isfinite(prediction).all(1) & np.isfinite(J).all((1, 2)) for prediction, J, _ in sides])
+    solved = np.array([np.isfinite(prediction).all(1) & np.isfinite(J).all((1, 2)) for prediction, J, *_ in sides])
     experiments = [np.flatnonzero(first.runs.condition == place) for place in range(len(settings))]
     kept = [place for place, of in enumerate(experiments) if solved[:, of].all()]
     if not kept:
@@ -147,17 +149,24 @@ def next_runs(rivals: Sequence[Hypothesis], *, seed: int = 0) -> tuple[tuple[Nex
     along = first.runs.along
     alone = np.array([_together(pairs, noise, along, of).min() for of in rows])
     runs = []
+    counts = _REPEATS if not whole else (1,) if first.runs.trace is None else _REPEATS_OF_TRACES
+    measured = told_apart[0].model.runs
+    apart = len(measured.session_names) == len(measured.trace_names)
     rng = np.random.default_rng(seed)
     order = np.argsort(-np.minimum(alone, _ENOUGH if whole else math.inf), kind="stable")
     for place in order[: _PROPOSED_WHOLE if whole else _PROPOSED].tolist():
-        for repeats in (1,) if whole else (1, 2, 4, 8, _MOST_REPEATS):
-            strength = float(_together(pairs, noise, along, rows[place] * repeats).min())
+        for repeats in counts:
+            if whole:
+                strengths = _together(pairs, noise, along, rows[place], repeats, apart=apart)
+            else:
+                strengths = _together(pairs, noise, along, rows[place] * repeats)
+            strength = float(strengths.min())
             decides = _decides(strength, rng)
             if decides >= _WANTED:
                 break
         runs.append(NextRun(settings[place], repeats, strength, decides))
     if whole:
-        return tuple(runs), Batch((runs[0].settings,), runs[0].separation, runs[0].decides)
+        return tuple(runs), Batch((runs[0].settings,) * runs[0].repeats, runs[0].separation, runs[0].decides)
     chosen, strength = _greedy(pairs, noise, along)
     batch = tuple(settings[place] for place in chosen)
     return tuple(runs), Batch(batch, strength, _decides(strength, rng))
@@ -178,15 +187,28 @@ def _greedy(pairs: Sequence[Pair], noise: Noise, along: Floats) -> tuple[list[in
     return sorted(chosen), float(tried[chosen[-1]].min())
 
 
-def _together(pairs: Sequence[Pair], noise: Noise, along: Floats, places: list[int]) -> Floats:
-    """Compute λ of several rows made together, for every pair; for `along` (m,) see `Runs`."""
-    white = noise.whitener(np.zeros(len(places), dtype=np.int64), along=along[places])  # one session
-    tables = (np.concatenate([pair.difference[..., None], pair.J], -1)[places] for pair in pairs)
-    whitened = (white(table) for table in tables)
-    return np.array([
-        _fit_again(table[:, 0], table[:, 1:], _root(pair.covariance)).left
-        for table, pair in zip(whitened, pairs, strict=True)
-    ])  # fmt: skip
+def _together(
+    pairs: Sequence[Pair], noise: Noise, along: Floats, places: list[int], repeats: int = 1, *, apart: bool = False
+) -> Floats:
+    """Compute λ of several rows made together, for every pair; for `along` (m,) see `Runs`.
+
+    Args:
+        repeats: how often all rows are made, each time with own numbers.
+        apart: each time is a session of its own; by default all are one.
+    """
+    session = np.repeat(np.arange(repeats) if apart else np.zeros(repeats, dtype=np.int64), len(places))
+    white, strengths = noise.whitener(session, along=np.tile(along[places], repeats)), []
+    for pair in pairs:
+        slopes, shared = pair.J[places], len(pair.covariance) - pair.own
+        own = shared + np.flatnonzero(slopes[..., shared:].any((0, 1)))
+        table = np.concatenate([pair.difference[places, :, None], slopes[..., :shared]], -1)
+        of_each = np.einsum("rs,mkp->rmksp", np.eye(repeats), slopes[..., own])
+        of_each = of_each.reshape(repeats * len(places), slopes.shape[1], -1)
+        whitened = white(np.concatenate([np.tile(table, (repeats, 1, 1)), of_each], -1))
+        known = pair.covariance[:shared, :shared], *[pair.covariance[np.ix_(own, own)]] * repeats
+        root = _root(block_diag(*known))
+        strengths.append(_fit_again(whitened[:, 0], whitened[:, 1:], root).left)
+    return np.array(strengths)
 
 
 class FittedAgain(NamedTuple):

@@ -86,13 +86,13 @@ SETS = {
 }
 
 
-def calibrated(name: str, table: str | Path | None = None) -> sf.ModelVerdict:
+def calibrated(name: str, table: str | Path | None = None, *, progress: bool = False) -> sf.ModelVerdict:
     """Calibrate one of SETS; a table that is not in the project is given."""
     measured = SETS[name]
     model, rows = load_model(MODELS / measured.model, table or MODELS / "data" / measured.table)
     return sf.calibrate(
         rows, model, session=measured.session, specimen=measured.specimen, trace=measured.trace,
-        held_out=measured.held_out, progress=False,
+        held_out=measured.held_out, progress=progress,
     )  # fmt: skip
 
 

@@ -100,7 +100,21 @@ def test_a_longer_trace_decides_where_these_cannot() -> None:
     assert best.settings[0]["read"] == "twice as long"
     assert best.decides > 0.99
     assert len(other) == 4
-    assert all(run.decides < 0.1 for run in other)
+    assert all(run.repeats == 4 and run.decides < 0.5 for run in other)
+
+
+def test_where_one_trace_is_not_enough_several_are_proposed() -> None:
+    """What is driven cannot be longer, so only more of the same tells the effects apart."""
+    time = np.arange(0, 1.201, 0.05)
+    table = traces("abc", "square", time=time)
+    table["load"] += 0.01 * np.sin(3 * table["t_s"])
+    found = sf.calibrate(table, MODEL, trace="run", session="day", progress=False)
+    assert found.verdict == "ambiguous"
+    assert found.next_batch is not None
+    assert len(found.next_batch.settings) == found.next_runs[0].repeats > 1
+    assert found.next_batch.worth_making
+    step = next(step for step in found.to_dict()["next_steps"] if "Measure" in step)
+    assert f"Measure {found.next_runs[0].repeats} traces, each with" in step
 
 
 @pytest.mark.parametrize(("effect", "title"), [("square", "acceleration"), ("growth", "growth")])

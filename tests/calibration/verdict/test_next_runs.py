@@ -158,6 +158,21 @@ def test_a_batch_repeats_the_best_setting_unless_a_parameter_or_a_session_absorb
     assert of_starts == pytest.approx(2.0)
 
 
+@pytest.mark.parametrize("apart", [False, True])
+def test_what_is_made_again_has_own_numbers_again(apart: bool) -> None:
+    """Two traces of three readings with a start of their own, against the same two written out."""
+    difference, shared, starts = (np.array(row)[:, None] for row in ([1.0, 2.0, 4.0], [0.5, 1.0, 1.5], [1.0] * 3))
+    once = Pair(difference, np.concatenate([shared, starts], 1)[:, None], np.diag([0.3, 100.0]), own=1)
+    each = np.kron(np.eye(2), starts)
+    J = np.concatenate([np.tile(shared, (2, 1)), each], 1)
+    noise = Noise(np.array([[0.25]]), 4.0)
+    shift = np.kron(np.eye(2), np.ones((3, 3))) if apart else np.ones((6, 6))
+    covariance = 0.25 * (np.eye(6) + 4.0 * shift) + J @ np.diag([0.3, 100.0, 100.0]) @ J.T
+    twice = np.tile(difference, (2, 1))[:, 0]
+    strength = _together([once], noise, np.ones(3), [0, 1, 2], 2, apart=apart)[0]
+    assert strength == pytest.approx(twice @ np.linalg.solve(covariance, twice))
+
+
 def test_a_batch_serves_all_pairs_of_rivals() -> None:
     """The first setting tells the first two apart, the second the others: a batch for all has both."""
     pairs = [pair(3.0, 0.0), pair(0.0, 2.0), pair(0.0, 2.0)]
