@@ -29,7 +29,7 @@ from calibration.verdict import explain
 from sim.model.presets import PRESETS
 from tests.oracles.drawn_swims import drawn_swim
 from tests.oracles.drawn_traces import FAMILIES, Design, draw_traces, model_of_traces, size_at
-from tests.oracles.others import SETS, calibrated
+from tests.oracles.others import SETS, calibrated, table_of
 from tests.oracles.swims import make_track
 
 _ANNOUNCED = re.compile(r"fit takes? ([\d.]+) (s|min) of processor time")
@@ -75,7 +75,7 @@ class Listener(io.StringIO):
 def cases() -> Iterator[tuple[str, Callable[[], Any]]]:
     """Yield what is calibrated, with progress."""
     for name, measured in SETS.items():
-        if measured.table:
+        if table_of(measured):
             yield measured.title, partial(calibrated, name, progress=True)
     for number, family in enumerate(FAMILIES.values()):
         for term in (effect.name for effect in family.effects[:2]):

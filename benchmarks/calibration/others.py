@@ -2,12 +2,12 @@
 
 One table in Markdown, for docs/explanation/found.md: what was withheld, what is named, and the error on runs that
 were held out, before and after, by sessions and by conditions. Then a table of traces, with errors on traces that
-were held out, and the falls of 2019 with other laws of wall and inertia. SHIP.csv and CAN.csv, which have no
-licence, are read if they are given. With a PICTURE.png the errors of the first table are drawn.
+were held out, and the falls of 2019 with other laws of wall and inertia. Tables that are not in the project are
+read from a FOLDER. With a PICTURE.png the errors of the first table are drawn.
 
-Usage: python -m benchmarks others [PICTURE.png] [SHIP.csv] [CAN.csv]
+Usage: python -m benchmarks others [PICTURE.png] [FOLDER]
 
-Takes three minutes.
+Takes three minutes, with all tables ten.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from scipy.optimize import minimize_scalar
 import softflagella as sf
 from benchmarks.common import heading, row
 from calibration.own_model.model_file import load_model
-from tests.oracles.others import MODELS, SETS, calibrated, named
+from tests.oracles.others import MODELS, SETS, calibrated, named, table_of
 
 _ERRORS = ("error_before", "error_after")
 
@@ -85,11 +85,10 @@ def print_traces(verdicts: Mapping[str, sf.ModelVerdict]) -> None:
         ))  # fmt: skip
 
 
-def main(picture: str = "", ship: str = "", can: str = "") -> None:
+def main(picture: str = "", folder: str = "") -> None:
     """Print the tables; draw the picture."""
-    beside = {"ship": ship, "filmcan": can}
-    names = [name for name in SETS if SETS[name].table or beside[name]]
-    all_verdicts = {name: calibrated(name, beside.get(name)) for name in names}
+    names = [name for name in SETS if table_of(SETS[name], folder)]
+    all_verdicts = {name: calibrated(name, folder) for name in names}
     verdicts = {name: verdict for name, verdict in all_verdicts.items() if SETS[name].trace is None}
     print(heading("set", "withheld", "named", "sessions, %", "conditions, %", "noise, %", "number", "known"))
     drawn = {}

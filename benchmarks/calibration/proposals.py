@@ -5,7 +5,7 @@ the rest is ambiguous, the settings that were left out are what the lab can set.
 the left-out run with the nearest settings is taken as measured, and decides; as many left-out runs drawn at random
 stand beside it. Of traces one of the first two is left out, and the others keep the first half of their readings.
 
-Usage: python -m benchmarks proposals
+Usage: python -m benchmarks proposals [FOLDER]     (with tables that are not in the project)
 
 Takes a minute.
 """
@@ -24,7 +24,7 @@ from calibration.findings.next_runs import Decision
 from calibration.own_model.model_file import load_model
 from common.arrays import Floats
 from common.errors import InputError
-from tests.oracles.others import MODELS, SETS, Published, named
+from tests.oracles.others import MODELS, SETS, Published, named, table_of
 
 _FEWEST = 4  # values of a setting of which a third is left out
 _TRACES = 2  # of a table that are left out, one after the other: the first ones
@@ -86,15 +86,16 @@ def decided(
     return sf.decide(together, verdict, verdict.model, **roles)
 
 
-def main() -> None:
+def main(folder: str = "") -> None:
     """Print a line for each ambiguous table, and how many there were."""
     tried = ambiguous = 0
     print(heading("set", "left out", "may explain", "decides, expected", "as proposed", "decided by these",
                   "by as many at random", "the whole table names"))  # fmt: skip
     for name, measured in SETS.items():
-        if not measured.table:
+        table = table_of(measured, folder)
+        if table is None:
             continue
-        model, rows = load_model(MODELS / measured.model, MODELS / "data" / measured.table)
+        model, rows = load_model(MODELS / measured.model, table)
         rows = rows if isinstance(rows, pd.DataFrame) else sf.read_table(rows)
         roles: dict[str, Any] = {
             "session": measured.session,

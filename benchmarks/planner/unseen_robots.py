@@ -7,24 +7,24 @@ within a revolution of the disc is added. Some that take little work are replaye
 error must hold in 95 % of the plans, and in 90 % in each third of the robots by their novelty: the distance from
 the middle of what the table has learned. The error stated with the robot's own table is that of the same schedule.
 
-Usage: python -m benchmarks unseen_robots [PLANS] [FIRST SEED] [REPLAYS]     (60, 9000 and 10)
+Usage: python -m benchmarks unseen_robots [PLANS] [FIRST SEED] [REPLAYS] [RECORDS]     (60, 9000 and 10)
 
 Takes 10 seconds of processor time a plan, and as much a replay.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.common import heading, in_parallel, per_cent, row, two_quantiles
+from benchmarks.common import Records, as_they_end, heading, per_cent, row, two_quantiles
 from common.errors import InputError
 from sim.motion.replay import replay, replay_error
 from sim.motion.warm import compile_once
 from surrogate.table_file import load
-from tests.oracles.unseen_robots import LONG, carried
+from tests.oracles.unseen_robots import KINDS, LONG, carried
 from tracking.tracks import tracking_error
 
 _LITTLE = 4e4  # radians that tails turn in a replay
@@ -35,6 +35,8 @@ class PlanOutcome(NamedTuple):
     """A plan and what became of it; lengths in l."""
 
     seed: int
+    tails: int
+    kind: str  # of the path
     flips: int
     length: float  # of the path as drawn
     novelty: float
@@ -50,7 +52,7 @@ def outcome(seed: int, in_time_steps: bool) -> PlanOutcome | str:
     """Plan and carry out one seed; or say why there is no plan."""
     lookup = load()
     try:
-        result, own_stated, found = carried(seed, lookup)
+        kind, result, own_stated, found = carried(seed, lookup)
     except InputError as refused:
         return f"{seed}: {refused}"
     schedule = result.schedule()
@@ -61,8 +63,9 @@ def outcome(seed: int, in_time_steps: bool) -> PlanOutcome | str:
         track = replay(schedule)
         replayed, error = tracking_error(result.to_dict(), track).largest, replay_error(schedule, track)
     return PlanOutcome(
-        seed, len(result.dwells), result.drawn.length, float(features[0, _NOVELTY]), result.predicted_max,
-        result.stated_error, found, own_stated, replayed, error,
+        seed, int(schedule.robot["N"]), kind, len(result.dwells), result.drawn.length,
+        float(features[0, _NOVELTY]), result.predicted_max, result.stated_error, found, own_stated, replayed,
+        error,
     )  # fmt: skip
 
 
@@ -78,26 +81,44 @@ def line(name: str, some: list[PlanOutcome], found: Callable[[PlanOutcome], floa
     return row(name, len(some), per_cent(held, len(some)), f"{ratio:.2f}", f"{own_ratio:.2f}", *values)
 
 
-def main(count: str = "60", first: str = "9000", replays: str = "10") -> None:
+def classes(plans: list[PlanOutcome]) -> Iterator[tuple[str, list[PlanOutcome]]]:
+    """Yield classes of plans by name: all, by tails, length, kind of path and novelty."""
+    yield "all", plans
+    for tails in sorted({one.tails for one in plans}):
+        yield f"N = {tails}", [one for one in plans if one.tails == tails]
+    yield from thirds(plans, "paths", lambda one: one.length, ("shortest", "middle", "longest"))
+    yield f"paths of more than {LONG:g} l", [one for one in plans if one.length > LONG]
+    for kind in KINDS:
+        yield kind, [one for one in plans if one.kind == kind]
+    yield from thirds(plans, "robots", lambda one: one.novelty, ("least novel", "middle", "most novel"))
+
+
+def thirds(
+    plans: list[PlanOutcome], what: str, key: Callable[[PlanOutcome], float], names: tuple[str, str, str]
+) -> Iterator[tuple[str, list[PlanOutcome]]]:
+    """Yield the thirds of the plans ordered by a key."""
+    ordered = sorted(plans, key=key)
+    for k, name in enumerate(names):
+        some = ordered[len(ordered) * k // 3 : len(ordered) * (k + 1) // 3]
+        ends = f", {key(some[0]):.0f} to {key(some[-1]):.0f} l" if some and what == "paths" else ""
+        yield f"{name} {what}{ends}", some
+
+
+def main(count: str = "60", first: str = "9000", replays: str = "10", file: str = "") -> None:
     compile_once()
+    records = Records(file)
     seeds = range(int(first), int(first) + int(count))
-    results = in_parallel(outcome, [(seed, index < int(replays)) for index, seed in enumerate(seeds)])
-    plans = [result for result in results if isinstance(result, PlanOutcome)]
-    for refused in (result for result in results if isinstance(result, str)):
-        print(refused)
+    cases = [(seed, index < int(replays)) for index, seed in enumerate(seeds) if seed not in records]
+    for result in as_they_end(outcome, cases):
+        if isinstance(result, str):
+            print(result, flush=True)
+        else:
+            records.add(result._asdict())
+    plans = [PlanOutcome(**record) for record in records.all]
     print(heading("carried out by the robot's own table", "plans", "held", "stated / found",
                   "the same with the own table", "predicted: median / 95 %", "stated", "found",
                   "stated with the own table"))  # fmt: skip
-    ordered = sorted(plans, key=lambda one: one.novelty)
-    cuts = [len(ordered) * k // 3 for k in range(4)]
-    classes = [
-        ("all", plans),
-        (f"paths of {LONG:g} l and less", [one for one in plans if one.length <= LONG]),
-        (f"paths of more than {LONG:g} l", [one for one in plans if one.length > LONG]),
-        *((f"{name} robots", ordered[cuts[k] : cuts[k + 1]])
-          for k, name in enumerate(("least novel", "middle", "most novel"))),
-    ]  # fmt: skip
-    for name, some in classes:
+    for name, some in classes(plans):
         if some:
             print(line(name, some, lambda one: one.own))
     simulated = [one for one in plans if np.isfinite(one.replayed)]
@@ -106,4 +127,5 @@ def main(count: str = "60", first: str = "9000", replays: str = "10") -> None:
         print(f"the simulator's own error of a track: {np.median([one.replay_error for one in simulated]):.4f} l "
               f"at the median, {max(one.replay_error for one in simulated):.4f} l at most")  # fmt: skip
     for one in sorted((one for one in plans if one.own > one.stated), key=lambda one: one.seed):
-        print(f"not held: seed {one.seed}, {one.flips} dwells, {one.own:.3f} l, stated {one.stated:.3f} l")
+        print(f"not held: seed {one.seed}, N = {one.tails}, {one.kind}, {one.flips} dwells, {one.own:.3f} l, "
+              f"stated {one.stated:.3f} l")  # fmt: skip

@@ -20,7 +20,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
 from calibration.attribution.hypothesis import Evidence, Hypothesis, Origin, Reason
 from calibration.attribution.left_out import session_gain
@@ -30,9 +29,12 @@ from calibration.statistics.fit import Fit, UnsolvedError, fit
 from calibration.statistics.residual_tests import Directions, Misfit, directions, examine_residual
 from calibration.statistics.statistical_model import ForwardModel, Parameter, Parameters, start_values
 from calibration.statistics.study import Study
+from common.progress import progress_bar
 
 FIRST = 3  # number of single effects to which a second one is added
 _DRAWS = 400  # of the bootstrap, for the residual that an effect leaves
+_NOT_YET = 0.9  # share of a size, so that nobody knows its prediction yet
+_SHORTEST = 1e-3  # s: what a prediction takes at least, as a clock is no finer
 _MARGIN = 0.01  # share of the range of a number that is its end
 
 
@@ -110,7 +112,7 @@ def examine(
         near: the fit whose scores they are (`scores`), by default `base`.
         beside: effects that `base` has already.
         single: extended BIC of the best single effect, which a pair must not cost.
-        after_first: is told, after the first fit, how many there are, and the processor time of this one.
+        after_first: is told, after the first fit, how many there are, and how much processor time all may take.
     """
     needed = misfit.critical_z if threshold is None else threshold
     effects = [e for e in study.effects if e not in beside]
@@ -122,22 +124,34 @@ def examine(
     candidates = scored(misfit, near, effects, needed, beside)
     if local:
         candidates = [judge(candidate, trial, RULES, Stage.SCORE) for candidate in candidates]
-    wanted = sum(c.reason is Reason.NOT_NEEDED for c in candidates)
     examined = []
     title = " ".join(("effects", *(f"beside {e.title}" for e in beside)))
     order = np.argsort(-np.abs(misfit.scores.z)).tolist()
-    for j in tqdm(order, desc=title, unit="effect", delay=1.0, disable=not study.progress or None):
-        candidate, began = candidates[j], clock()
-        if candidate.reason is Reason.NOT_NEEDED:
-            candidate = _fitted(study, near, candidate, float(misfit.second[j]), local=local)
-            if candidate.fit:
-                measures = measures_of(study, base, directions.without(j))
-                candidate = judge(candidate, replace(trial, measures=measures), RULES)
-            if candidate.fit and after_first:
-                after_first(wanted, clock() - began)
-                after_first = None
-        examined.append(candidate)
+    with progress_bar(title, unit="effect", total=len(order), disable=not study.progress) as bar:
+        for j in order:
+            candidate, began = candidates[j], clock()
+            if candidate.reason is Reason.NOT_NEEDED:
+                bar.set_postfix_str(candidate.title, refresh=False)
+                candidate = _fitted(study, near, candidate, float(misfit.second[j]), local=local)
+                if candidate.fit:
+                    measures = measures_of(study, base, directions.without(j))
+                    candidate = judge(candidate, replace(trial, measures=measures), RULES)
+                if candidate.fit and after_first:
+                    of_first, first = clock() - began, _cost(study, near, candidate)
+                    costs = [_cost(study, near, c) for c in candidates if c.reason is Reason.NOT_NEEDED]
+                    after_first(len(costs), of_first * sum(costs) / first)
+                    after_first = None
+            examined.append(candidate)
+            bar.update()
     return with_look_alikes(examined)
+
+
+def _cost(study: Study, near: Fit, candidate: Hypothesis) -> float:
+    """Measure the processor time of a prediction with an effect [s]; all effects need about as many of them."""
+    began, size = clock(), candidate.evidence.expected or candidate.effect.typical
+    low, high = candidate.effect.bounds
+    study.model.predict([{**near.parameters, candidate.effect.name: min(max(_NOT_YET * size, low), high)}])
+    return clock() - began + _SHORTEST
 
 
 def with_look_alikes(examined: Sequence[Hypothesis]) -> list[Hypothesis]:

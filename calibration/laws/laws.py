@@ -29,7 +29,6 @@ from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
-from tqdm import tqdm
 
 from calibration.attribution.hypothesis import Evidence, Hypothesis, Origin, Reason
 from calibration.attribution.left_out import session_gain
@@ -54,6 +53,7 @@ from calibration.swimmer.swimmer import SwimmerModel
 from calibration.words.render import say_laws
 from common.arrays import Floats
 from common.errors import InputError
+from common.progress import progress_bar
 
 _LARGEST_AT_START = 50.0  # size of a term
 _RPM = 30 / math.pi
@@ -372,9 +372,13 @@ def find_laws(study: Study, base: Fit, *, beside_claim: bool = False) -> Laws:
 
 def _fit_all(study: Study, base: Fit, likely: Sequence[Ranked], *, chosen_alone: bool) -> list[Hypothesis]:
     """Fit and judge places, without those where the motion cannot be simulated; see `fitted_law`."""
-    bar = tqdm(likely, desc="laws", unit="law", delay=1.0, disable=not study.progress or None)
-    tried = (one for one in bar if not skipped("some laws"))
-    return [law for one in tried if (law := fitted_law(study, base, one, chosen_alone=chosen_alone))]
+    laws = []
+    with progress_bar("laws", unit="law", total=len(likely), disable=not study.progress) as bar:
+        for one in likely:
+            if not skipped("some laws") and (law := fitted_law(study, base, one, chosen_alone=chosen_alone)):
+                laws.append(law)
+            bar.update()
+    return laws
 
 
 def _with_levers(

@@ -150,7 +150,7 @@ def _forecast(study: Study, began: Work, of_first_tests: float, of_a_test: float
     """Return what says, after the first fit, how many seconds of processor time all fits take, and pairs."""
 
     def forecast(count: int, seconds: float) -> None:
-        single = count * max(seconds, of_a_test)
+        single = max(seconds, count * of_a_test)
         pairs_take, left = FIRST * (of_first_tests + single), seconds_left(began)
         ends = f"; the search ends after about {_duration(left)}" * (left < single + pairs_take)
         if study.progress:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -24,6 +25,7 @@ LONG = 150.0  # l, from which a path is a long one
 class Carried(NamedTuple):
     """A plan that the vehicle of the robot's own table carried out; lengths in l."""
 
+    kind: str  # of the path
     result: Plan
     own_stated: float  # stated error of the same schedule with the robot's own table
     found: float  # largest distance from the declared path, with the motion within a revolution of the disc
@@ -51,12 +53,12 @@ def lab_robot(rng: np.random.Generator) -> Robot:
     return robot.with_motor(float(np.exp(rng.uniform(np.log(5), np.log(80)))))
 
 
-def lab_path(rng: np.random.Generator) -> Path2D:
-    """Draw a path of 5 to 250 l: race track, field, handwriting, coast, polygon, circle or eight."""
+def lab_path(rng: np.random.Generator) -> tuple[str, Path2D]:
+    """Draw one of KINDS of paths, of 5 to 250 l; return its kind, too."""
     length = float(np.exp(rng.uniform(np.log(5), np.log(250))))
-    kinds = (_race_track, _field, _handwriting, _coast, _regular)
-    path = kinds[int(rng.integers(len(kinds)))](rng, length)
-    return path.scaled(length / path.length)
+    kind = list(KINDS)[int(rng.integers(len(KINDS)))]
+    path = KINDS[kind](rng, length)
+    return kind, path.scaled(length / path.length)
 
 
 def _race_track(rng: np.random.Generator, _length: float) -> Path2D:
@@ -102,6 +104,15 @@ def _regular(rng: np.random.Generator, _length: float) -> Path2D:
     return (circle(1.0), eight, polygon(int(rng.integers(3, 7)), 1.0))[int(rng.integers(3))]
 
 
+KINDS: dict[str, Callable[[np.random.Generator, float], Path2D]] = {
+    "race track": _race_track,
+    "field": _field,
+    "handwriting": _handwriting,
+    "coast": _coast,
+    "polygon, circle or eight": _regular,
+}
+
+
 def carried(seed: int, lookup: NeuralTable) -> Carried:
     """Draw a robot and a path, plan, and carry the plan out.
 
@@ -110,10 +121,11 @@ def carried(seed: int, lookup: NeuralTable) -> Carried:
     """
     rng = np.random.default_rng(seed)
     robot = lab_robot(rng)
-    result = plan(lab_path(rng), robot, lookup=lookup)
+    kind, path = lab_path(rng)
+    result = plan(path, robot, lookup=lookup)
     own = tabulate(robot)
     tracked = result.tracked._replace(vehicle=table_vehicle(robot, own))
     errors = plan_errors(tracked, result.drawn, result.declared, result.switches, guaranteed=None, seed=0)
     track = roll_out(tracked.vehicle, result.switches, tracked.offset).track
     found = predicted_error(result.reference, track, closed=result.drawn.closed).largest
-    return Carried(result, errors.stated, found + WOBBLE)
+    return Carried(kind, result, errors.stated, found + WOBBLE)

@@ -15,13 +15,13 @@ from tests.shared import shared
 
 MEASURED = Path(__file__).parents[4] / "shared/measured"
 SHIP, CAN = MEASURED / "real/ship_captive.csv", MEASURED / "traces/filmcan.csv"
-BESIDE = {"ship": SHIP, "filmcan": CAN}
+BESIDE = {"ship": SHIP.parent, "filmcan": CAN.parent}
 CAPILLARY = 0.1946  # Pa s, of the oil of 2019
 
 
 @shared
 def record(name: str) -> dict[str, Any]:
-    return calibrated(name, BESIDE.get(name)).facts
+    return calibrated(name, BESIDE.get(name, "")).facts
 
 
 def falls(name: str) -> tuple[float, float]:
