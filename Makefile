@@ -34,12 +34,13 @@ PYTEST := -m pytest -n auto --dist worksteal
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
 
+# The simulator's loops take longest, in two processes; the others use what these leave of the processors.
 setup: $(STAMP) ## make .venv, install everything, pinned, and compile all loops
 $(STAMP): pyproject.toml constraints.txt | $(VENV)/bin/uv
 	$(INSTALL) -e '.[dev]'
-	$(RUN) -m sim compile
-	$(RUN) -m planner compile
-	$(RUN) -m calibration compile
+	nice -n 10 $(RUN) -m planner compile & planner=$$!; \
+	nice -n 10 $(RUN) -m calibration compile & swims=$$!; \
+	$(RUN) -m sim compile && wait $$planner && wait $$swims
 	touch $@
 $(VENV)/bin/uv: constraints.txt
 	$(PYTHON) -m venv $(VENV)
