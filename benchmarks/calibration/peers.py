@@ -6,10 +6,11 @@ model (statsmodels), linear near the fit without effects, with a random level fo
 that cool pysindy, with rates of cooling up to the cube of the excess. All of them fit all rows; the loop holds out
 a session.
 
-Usage: python -m benchmarks peers [TABLES] [FIRST_SEED] [PICTURE.png]
+Usage: python -m benchmarks peers [TABLES] [FIRST_SEED] [PICTURE.png] [FOLDER]
        TABLES: of each case. A method that is not installed (extra `peers`) is left out, and named.
+       FOLDER: of published tables that are not in the project.
 
-Takes five minutes.
+Takes fifteen minutes.
 """
 
 from __future__ import annotations
@@ -25,11 +26,11 @@ from threadpoolctl import threadpool_limits
 
 import softflagella as sf
 from benchmarks.calibration.forms import FormsCase, drawn
-from benchmarks.common import heading, in_parallel, per_cent, row
+from benchmarks.common import as_they_end, heading, in_parallel, per_cent, row
 from calibration.own_model.model_file import load_model
 from tests.oracles.drawn_falls import declared
 from tests.oracles.drawn_traces import FAMILIES, Design, draw_traces, model_of_traces, size_at
-from tests.oracles.others import MODELS, SETS, named
+from tests.oracles.others import MODELS, SETS, named, table_of
 from tests.oracles.peers import (
     LEAST_SQUARES,
     MIXED,
@@ -124,22 +125,28 @@ def said(place: int, seed: int) -> tuple[int, dict[str, dict[str, Any]]]:
     return place, worth
 
 
-def published() -> None:
-    """Print what each method names in the published tables of runs, without and with a level for each session."""
-    sets = {name: of for name, of in SETS.items() if of.table and of.trace is None}
-    rows = in_parallel(_of_published, [(name,) for name in sets])
-    methods = [method for method in (LOOP, *LEAST_SQUARES, MIXED) if any(method in answers for _, answers in rows)]
+def published(folder: str = "") -> None:
+    """Print what each method names in published tables and traces, those of a folder among them."""
+    cases = [(name, folder) for name, of in SETS.items() if table_of(of, folder)]
+    methods = (LOOP, *LEAST_SQUARES, MIXED)
     print("\n" + heading("published table", "withheld", *methods))
-    for name, answers in rows:
-        print(row(sets[name].title, sets[name].withheld, *(answers.get(method, "–") for method in methods)))
+    for name, answers in as_they_end(_of_published, cases):
+        cells = [answers.get(method, "–") for method in methods]
+        print(row(SETS[name].title, SETS[name].withheld, *cells), flush=True)
 
 
-def _of_published(name: str) -> tuple[str, dict[str, str]]:
+def _of_published(name: str, folder: str) -> tuple[str, dict[str, str]]:
+    """Ask every method; those beside the loop have no numbers of a specimen."""
     threadpool_limits(1)
-    model, table = load_model(MODELS / SETS[name].model, MODELS / "data" / SETS[name].table)
-    frame = table if isinstance(table, pd.DataFrame) else pd.read_csv(table)
-    roles = {key: value for key in ("session", "specimen") if (value := getattr(SETS[name], key))}
-    answers = answers_of(model, frame.dropna(), roles)
+    table = table_of(SETS[name], folder)
+    assert table is not None
+    model, rows = load_model(MODELS / SETS[name].model, table)
+    frame = rows if isinstance(rows, pd.DataFrame) else pd.read_csv(rows)
+    roles = {key: value for key in ("session", "specimen", "trace") if (value := getattr(SETS[name], key))}
+    if any(number.per == "specimen" for number in model.numbers):
+        answers = by_loop(model, frame, **roles)
+    else:
+        answers = answers_of(model, frame.dropna(), roles)
     return name, {
         method: answer.words or ", ".join(sorted(answer.named)) or "nothing" for method, answer in answers.items()
     }
@@ -162,7 +169,7 @@ def draw(shares: Mapping[str, Mapping[str, float]], picture: str) -> None:
     figure.savefig(picture, dpi=110)
 
 
-def main(tables: str = "40", first: str = "0", picture: str = "") -> None:
+def main(tables: str = "40", first: str = "0", picture: str = "", folder: str = "") -> None:
     missing = sorted({module for module in NEEDS.values() if find_spec(module) is None})
     if missing:
         print(f"not installed, and left out: {', '.join(missing)}\n")
@@ -185,4 +192,4 @@ def main(tables: str = "40", first: str = "0", picture: str = "") -> None:
                 shares[method].setdefault(_HELD, []).extend(held)
     if picture:
         draw({m: {k: 100 * float(np.mean(v)) for k, v in of.items() if v} for m, of in shares.items()}, picture)
-    published()
+    published(folder)
