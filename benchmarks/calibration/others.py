@@ -115,7 +115,7 @@ def main(picture: str = "", folder: str = "") -> None:
 
 def draw(drawn: dict[str, list[float]], picture: str) -> None:
     """Draw errors before and after, by sessions and by conditions, and the noise."""
-    figure, axes = plt.subplots(figsize=(7.2, 0.55 * len(drawn) + 1.1), layout="constrained")
+    figure, axes = plt.subplots(figsize=(7.2, 0.4 * len(drawn) + 1.1), layout="constrained")
     arrow = {"arrowstyle": "-|>", "lw": 1.5, "shrinkA": 0, "shrinkB": 0}
     for place, errors in enumerate(drawn.values()):
         for side, what in enumerate(("sessions", "conditions")):
@@ -125,10 +125,12 @@ def draw(drawn: dict[str, list[float]], picture: str) -> None:
         noise, label = errors[-1], None if place else "noise of a run, if known"
         axes.plot([noise] * 2, [-place - 0.32, -place + 0.32], "k", lw=1.5, label=label)
     axes.set_xscale("log")
-    axes.set_xticks([1, 2, 5, 10, 20, 50], ["1", "2", "5", "10", "20", "50"])
+    axes.set_xticks([0.5, 1, 2, 5, 10, 20, 50, 100], ["0.5", "1", "2", "5", "10", "20", "50", "100"])
+    axes.set_xlim(0.9 * min(min(errors[:4]) for errors in drawn.values()))
+    axes.set_ylim(0.6 - len(drawn), 0.6)
     axes.minorticks_off()
     axes.set_yticks(-np.arange(len(drawn)), [SETS[name].title for name in drawn])
     axes.set_xlabel("error, %: without what was withheld → with what is named")
     axes.grid(axis="x", alpha=0.3)
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.16), ncols=3, frameon=False, fontsize="small")
+    figure.legend(loc="outside upper center", ncols=3, frameon=False, fontsize="small")
     figure.savefig(picture, dpi=110)
