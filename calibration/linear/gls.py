@@ -442,7 +442,7 @@ def averaging_rows(session: Integers, scale: Floats | None = None) -> tuple[Floa
 
 
 def repeat_covariance(y: Floats, repeated: Integers | Floats, scale: Floats | None = None) -> Floats:
-    """Estimate S (..., k, k) from the scatter of (..., n, k) between repeats, pooled.
+    """Estimate S (..., k, k) from the scatter of (..., n, k) between repeats, pooled; 0 without a repeat.
 
     Args:
         repeated: see `Runs.repeats`; each level, and each column of a design, has its own effect on y.
@@ -451,7 +451,7 @@ def repeat_covariance(y: Floats, repeated: Integers | Floats, scale: Floats | No
     basis = _same_in_repeats(repeated, scale)
     y = y if scale is None else y * scale[:, None]
     centred = y - basis @ (basis.T @ y)
-    return np.asarray(np.swapaxes(centred, -1, -2) @ centred / (len(basis) - basis.shape[1]))
+    return np.asarray(np.swapaxes(centred, -1, -2) @ centred / max(len(basis) - basis.shape[1], 1))
 
 
 def repeat_count(repeated: Integers | Floats) -> int:

@@ -181,3 +181,9 @@ def test_lengths_are_those_of_a_dense_covariance() -> None:
     shown = np.asarray(misfit.scores.survived) > model.runs.least_surviving
     assert shown.sum() > 5
     assert misfit.scores.length[shown] == pytest.approx(lengths[shown], rel=1e-4)
+
+
+def test_without_a_repeat_no_scatter_is_seen() -> None:
+    """And nothing is divided by zero."""
+    assert repeat_covariance(np.array([[1.0], [3.0]]), np.arange(2)) == 0
+    assert repeat_covariance(np.array([[1.0], [3.0]]), np.zeros(2, dtype=np.int64))[0, 0] == pytest.approx(2.0)

@@ -155,6 +155,25 @@ def test_a_pair_of_forms_is_none_where_one_of_them_is_at_the_end_of_its_range() 
     assert len(named(verdict)) < 2
 
 
+def test_few_repeats_are_too_few_not_missing() -> None:
+    weights, rng = np.repeat([20.0, 50.0, 100.0], [7, 9, 7]), np.random.default_rng(4)
+    steps = np.geomspace(15, 300, 9)
+    viscosity = np.concatenate([steps[:7], steps, steps[3:], steps[8:]])
+    time = 30 * viscosity / (weights - 3.0) * np.exp(0.01 * rng.normal(size=23))
+    model = sf.Model(
+        lambda c, p: {"time_s": p["constant"] * c["viscosity"] / (c["weight_g"] - p["friction"])},
+        outputs={"time_s": sf.Output("time", unit="s")},
+        numbers=[sf.Number("constant", 20.0, low=1, high=100)],
+        effects=[sf.Effect("friction", "friction", low=-5, high=20, unit="g", typical=2)],
+    )
+    table = pd.DataFrame({"weight_g": weights, "viscosity": viscosity, "time_s": time})
+    verdict = sf.calibrate(table, model, progress=False)
+    assert not verdict.runs.noise_known
+    assert "of the runs that are fitted are repeats, and without a declared noise 8 are needed" in " ".join(
+        verdict.caveats
+    )
+
+
 def diode(columns: Columns, p: Mapping[str, float]) -> dict[str, Any]:
     """Compute the current of a diode in series with an ammeter, whose resistance may be in the reading."""
     current = p["saturation"] * np.expm1(columns["volts_V"] / 0.05)
