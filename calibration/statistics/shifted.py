@@ -40,7 +40,7 @@ class Shift:
         typical = 0.1 if self.parameter.logarithmic else self.parameter.sigma or self.parameter.typical
         end = math.inf if self.sigma else _LARGEST if self.parameter.logarithmic else 100 * typical
         name, title = f"{self.parameter.name} {self.where}", f"{self.parameter.title} {self.where}"
-        return Parameter(name, title, 0.0, (-end, end), typical, sigma=self.sigma)
+        return Parameter(name, title, 0.0, (-end, end), typical, sigma=self.sigma, of_these_runs=True)
 
 
 @dataclass(frozen=True)

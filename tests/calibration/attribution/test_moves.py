@@ -13,7 +13,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calibration.attribution.hypothesis import Hypothesis, Origin
 from calibration.attribution.moves import find_moves, groups_that_may_differ
+from calibration.findings.next_runs import Explanation, standings
 from calibration.linear.gls import repeat_count, repeat_covariance
 from calibration.robot.robot_verdict import RobotVerdict
 from calibration.statistics.fit import fit
@@ -107,6 +109,19 @@ def test_derivatives_along_a_change_are_those_of_differences() -> None:
         at = {**start_values(moved), **{name: 0.1 for name in names[1:]}}
         close = by_differences(moved, at, names)[1]
         assert derivatives(moved, at, names)[1] == pytest.approx(close, abs=0.02 * np.abs(close).max())
+
+
+def test_a_change_of_these_runs_is_no_part_of_an_explanation_of_new_ones() -> None:
+    """New runs have sessions of their own, so nothing can be asked of what differs in one that was."""
+    with on_the_toy():
+        model = toy_swimmer(in_days(toy_table(3)))
+        shift = Shift(model.coefficients[1], model.runs.session == 1, "in session day 2")
+        moved, used = Shifted(model, (shift,)), np.ones(len(model.runs), dtype=bool)
+        fitted = fit(moved, start_values(moved), ["C_t", "C_r", shift.change.name], used, title="")
+        explanation = Explanation.of(Hypothesis(Origin.EFFECT, model.effects[:1], fitted))
+        assert list(explanation.parameters) == ["C_t", "C_r"]
+        standing = standings(model, [explanation], model.runs.session == 3)
+    assert np.isfinite(standing[0].behind)
 
 
 @pytest.mark.slow
