@@ -38,7 +38,7 @@ def adopt_in_turns(study: Study, attribution: Attribution) -> Attribution:
             attribution = replace(attribution, candidates=tuple(seen.values()))
             if not runs.noise_known:
                 first, form, alike = _nearest_pair(study, base, candidates, form, alike)
-        if form is None or (not runs.noise_known and _beside_others_at_an_end(study, form)):
+        if form is None:
             break
         claimed = replace(form, added=(*(first.added if first else ()), form.effect))
         index = next(i for i, e in enumerate(study.effects) if e.name == form.effect.name)
@@ -52,6 +52,8 @@ def adopt_in_turns(study: Study, attribution: Attribution) -> Attribution:
             tangents, misfit = tangents.without(index), misfit.without(index)
             candidates = tuple(c for c in candidates if c.effect != form.effect)
             continue
+        if not runs.noise_known and _beside_others_at_an_end(study, form):
+            break
         attribution = replace(attribution, nearest=form, forms=alike)
         if first:
             turns.append(_turn(study, first.fitted, first.title, largest_along(misfit, runs)))

@@ -102,8 +102,9 @@ def rivals(*slopes: float) -> tuple[Any, Any]:
         J = np.stack([0 * shape, shape, np.ones_like(shape)], -1)
         place = np.repeat(np.arange(len(of)), len(TIME))
         runs = SimpleNamespace(
-            y=y, session=0 * place, along=np.zeros(len(y)), outputs=("y",), condition=place, memory=None
-        )
+            y=y, session=0 * place, along=np.zeros(len(y)), outputs=("y",), condition=place, memory=None,
+            trace=None, trace_names=(), session_names=("swim",),
+        )  # fmt: skip
         every = (*known, start)
         return SimpleNamespace(
             runs=runs, coefficients=every, nuisances=(), effects=(),

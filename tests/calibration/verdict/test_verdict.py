@@ -140,7 +140,7 @@ def test_the_end_of_the_search_is_told_where_it_comes_before_all_fits(
 ) -> None:
     shown: Any = SimpleNamespace(progress=True)
     with limited(Work(seconds=seconds)):
-        _forecast(shown, work_done(), 1.0, 0.1)(3, 2.0)
+        _forecast(shown, work_done(), 1.0, 0.1)(3, 6.0)
     said = capsys.readouterr().err
     assert "3 effects to fit take 6 s of processor time" in said
     assert "pairs follow, 21 s at most" in said
