@@ -214,9 +214,7 @@ def _adopted(form: Hypothesis, alike: Sequence[Hypothesis], runs: Runs) -> dict[
         "spread": evidence.spread,
         "scale": "logarithm" if form.logarithmic else "as it is",
         "sizes": {name: list(size) for name, size in evidence.sizes.items()},
-        "sizes_of": "specimens"
-        if runs.specimen is not None
-        else f"sessions{' of traces' * (runs.trace is not None)}",
+        "sizes_of": _specimens_in_words(runs),
         "removed_share": min(evidence.removed or 0.0, 1.0),
         "session_gain": [evidence.paired.gain, evidence.paired.error],
         "birge": evidence.birge,

@@ -270,9 +270,10 @@ class FunctionModel:
             table = table.drop(columns=name).merge(pd.Series(own, name=name, dtype=float), how="cross")
         table = table.drop_duplicates(names)
         settings = [dict(zip(names, row, strict=True)) for row in table[names].itertuples(index=False, name=None)]
-        session = {"session": np.zeros(len(table), dtype=np.int64), "session_names": (_NEXT,)}
-        runs = self.runs.subset(table.pop("row").to_numpy())
-        runs = replace(runs, condition=np.arange(len(table)), **session)
+        runs = replace(
+            self.runs.subset(table.pop("row").to_numpy()), condition=np.arange(len(table)),
+            session=np.zeros(len(table), dtype=np.int64), session_names=(_NEXT,),
+        )  # fmt: skip
         values = {name: table[name].to_numpy().astype(old.dtype) for name, old in self.columns.items()}
         return replace(self, runs=runs, columns=AskedColumns(values, self.columns.asked), known={}), settings
 

@@ -189,13 +189,13 @@ def _heads(model: Model, known: Mapping[str, Any]) -> Flags | None:
 
     They are the first of each trace, where there are traces, whether a number is that of a trace or of many.
     """
-    groups = {number.per: known["trace" if model.time else number.per] for number in model.numbers if number.per}
+    kinds = {"trace" if model.time else number.per for number in model.numbers if number.per}
     heads = np.zeros(len(known["rows"]), dtype=bool)
-    for group in groups.values():
-        for kind in np.unique(group):
-            rows = np.flatnonzero(group == kind)
+    for group in (known[kind] for kind in kinds):
+        for place in np.unique(group):
+            rows = np.flatnonzero(group == place)
             heads[rows[: max(FEWEST_READINGS, math.ceil(_HEAD * len(rows)))]] = True
-    return heads if groups else None
+    return heads if kinds else None
 
 
 def _advice(model: FunctionModel, roles: Roles) -> list[str]:
