@@ -6,14 +6,17 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from calibration.attribution.hypothesis import Evidence, Hypothesis, Origin
 from calibration.attribution.rules import RULES, Trial, doubted
 from calibration.findings.held_out import HeldOutErrors
+from calibration.findings.record import _specimens_in_words
 from calibration.statistics.budget import Work, limited, work_done
 from calibration.statistics.study import Study
 from calibration.verdict import calibrate
+from calibration.verdict.calibrate import _listed
 from calibration.verdict.explain import _forecast
 from calibration.verdict.verdict import Verdict
 from calibration.words.render import next_steps
@@ -145,3 +148,17 @@ def test_the_end_of_the_search_is_told_where_it_comes_before_all_fits(
     assert "3 effects to fit take 6 s of processor time" in said
     assert "pairs follow, 21 s at most" in said
     assert ("the search ends after about 5 s" in said) == comes_first
+
+
+@pytest.mark.parametrize(
+    ("specimen", "trace", "words"),
+    [(np.zeros(2), None, "specimens"), (None, None, "sessions"), (None, np.zeros(2), "sessions of traces")],
+)
+def test_sizes_differ_between_specimens_only_where_some_are_noted(specimen: Any, trace: Any, words: str) -> None:
+    runs: Any = SimpleNamespace(specimen=specimen, trace=trace)
+    assert _specimens_in_words(runs) == words
+
+
+def test_of_many_single_readings_the_first_three_are_listed() -> None:
+    assert _listed(["a", "b", "c"]) == "a; b; c"
+    assert _listed(["a", "b", "c", "d", "e"]) == "a; b; c; and 2 others"
