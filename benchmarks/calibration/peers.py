@@ -26,9 +26,12 @@ from threadpoolctl import threadpool_limits
 
 import softflagella as sf
 from benchmarks.calibration.forms import FormsCase, drawn
+from benchmarks.calibration.swims import hidden
 from benchmarks.common import as_they_end, heading, in_parallel, per_cent, row
 from calibration.own_model.model_file import load_model
+from sim.knowledge import COEFFICIENTS
 from tests.oracles.drawn_falls import declared
+from tests.oracles.drawn_swims import drawn_swim
 from tests.oracles.drawn_traces import FAMILIES, Design, draw_traces, model_of_traces, size_at
 from tests.oracles.others import MODELS, SETS, named, table_of
 from tests.oracles.peers import (
@@ -41,31 +44,44 @@ from tests.oracles.peers import (
     by_mixed_model,
     by_sindy,
 )
+from tests.oracles.swim_peers import swim_by_least_squares
+from tests.oracles.swims import make_track
 
 LOOP = "this loop"
 _NULL, _PLANTED, _HELD = (
     "nothing planted: an effect is named", "one effect at 8 σ: it is among what is named", "95 % intervals hold",
 )  # fmt: skip
+_SWIMS = 4  # one table in so many is a swim, which takes a minute
 _DRAWN = {_NULL: "C3", _PLANTED: "C2", _HELD: "C0"}
 
 
 def by_loop(model: sf.Model, table: pd.DataFrame, **roles: Any) -> dict[str, Finding]:
     """Ask the loop; a form that it adopts is no claim."""
-    verdict = sf.calibrate(table, model, progress=False, **roles)
+    return {LOOP: _found(sf.calibrate(table, model, progress=False, **roles))}
+
+
+def _found(verdict: Any) -> Finding:
     sets = [claim.added for claim in (*verdict.claims, *verdict.attribution.rival_effects)]
     words = named(verdict.facts)
     if verdict.nearest:
         words = f"as a description: {words}"
-    return {LOOP: Finding(frozenset(e.name for added in sets for e in added), verdict.final_intervals, words)}
+    return Finding(frozenset(e.name for added in sets for e in added), verdict.final_intervals, words)
+
+
+class Answered(NamedTuple):
+    """What the methods say of one table or swim, what is planted in it, and its true numbers."""
+
+    answers: Mapping[str, Finding]
+    term: str
+    truth: Mapping[str, float]
 
 
 class Case(NamedTuple):
-    """How tables are drawn."""
+    """What the methods are asked."""
 
     label: str
-    draw: Callable[[int], tuple[sf.Model, pd.DataFrame, str]]  # seed -> model, table, what is planted
-    truth: Mapping[str, float]
-    roles: Mapping[str, str]
+    ask: Callable[[int], Answered]  # of a seed
+    share: int = 1  # one seed in so many is asked
 
 
 def _falls(case: FormsCase, seed: int) -> tuple[sf.Model, pd.DataFrame, str]:
@@ -81,13 +97,28 @@ def _cups(rho: float, kind: str, seed: int) -> tuple[sf.Model, pd.DataFrame, str
     return model_of_traces(family), draw_traces(family, design, seed, **planted), term
 
 
+def _of_table(draw: Any, truth: Mapping[str, float], roles: Mapping[str, str], seed: int) -> Answered:
+    model, table, term = draw(seed)
+    return Answered(answers_of(model, table, roles), term, truth)
+
+
 def _balls(label: str, *case: Any) -> Case:
-    return Case(f"balls, {label}", partial(_falls, FormsCase("", *case)), {"viscosity": 1.0}, {"session": "round"})
+    drawn_with = partial(_falls, FormsCase("", *case))
+    return Case(f"balls, {label}", partial(_of_table, drawn_with, {"viscosity": 1.0}, {"session": "round"}))
 
 
 def _of_cups(label: str, *case: Any) -> Case:
     truth, roles = FAMILIES["cups"].shared, {"session": "day", "trace": "trace"}
-    return Case(f"cups, {label}", partial(_cups, *case), truth, roles)
+    return Case(f"cups, {label}", partial(_of_table, partial(_cups, *case), truth, roles))
+
+
+def _swim(with_effect: bool, seed: int) -> Answered:
+    swim = drawn_swim(seed)
+    term, truth = hidden(swim, seed) if with_effect else ("", swim.truth)
+    track = make_track(truth, swim.plan, seed=seed, **swim.disturbed)
+    verdict = sf.calibrate(track, swim.given, plan=swim.plan, seed=seed, jobs=1, progress=False)
+    answers = {LOOP: _found(verdict), **swim_by_least_squares(swim, track)}
+    return Answered(answers, term, {name: getattr(swim.truth, name) for name in COEFFICIENTS})
 
 
 CASES = (
@@ -97,6 +128,8 @@ CASES = (
     *(_of_cups(f"nothing; neighbours correlated by {rho}", rho, "") for rho in (0.0, 0.9)),
     _of_cups("one effect at 8 σ; 0.9", 0.9, "effect"),
     _of_cups("one at 8 σ that is not in the catalogue; 0.9", 0.9, "mimic"),
+    Case("swims, nothing", partial(_swim, False), _SWIMS),
+    Case("swims, one effect at 8 σ", partial(_swim, True), _SWIMS),
 )
 
 
@@ -115,11 +148,10 @@ def answers_of(model: sf.Model, table: pd.DataFrame, roles: Mapping[str, str]) -
 def said(place: int, seed: int) -> tuple[int, dict[str, dict[str, Any]]]:
     """Draw a table of a case, and say what every method's answer is worth."""
     threadpool_limits(1)
-    case = CASES[place]
-    model, table, term = case.draw(seed)
+    answers, term, truth = CASES[place].ask(seed)
     worth = {}
-    for method, answer in answers_of(model, table, case.roles).items():
-        held = [low <= case.truth[n] <= high for n, (low, high) in answer.intervals.items() if n in case.truth]
+    for method, answer in answers.items():
+        held = [low <= truth[n] <= high for n, (low, high) in answer.intervals.items() if n in truth]
         worth[method] = {"named": bool(answer.named), "right": term in answer.named,
                          "alone": answer.named == {term}, "held": held}  # fmt: skip
     return place, worth
@@ -174,7 +206,8 @@ def main(tables: str = "40", first: str = "0", picture: str = "", folder: str = 
     if missing:
         print(f"not installed, and left out: {', '.join(missing)}\n")
     seeds = range(int(first), int(first) + int(tables))
-    done = in_parallel(said, [(place, seed) for place in range(len(CASES)) for seed in seeds])
+    asked = [(place, seed) for place, case in enumerate(CASES) for seed in seeds[:: case.share]]
+    done = in_parallel(said, asked)
     shares: dict[str, dict[str, list[bool]]] = {}
     print(heading("case", "method", "names an effect", "right, or in the set", "right, alone", "intervals hold"))
     for place, case in enumerate(CASES):

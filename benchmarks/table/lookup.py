@@ -1,6 +1,6 @@
 """Held-out error of the shipped look-up table, as it states it, and the coverage of its intervals.
 
-Usage: python -m benchmarks lookup [MODEL]
+Usage: python -m benchmarks lookup [MODEL] [WORK]    with the fresh robots kept in WORK by shipped_table
 
 The robots are drawn as users draw them, with another seed than those of the calibration.
 
@@ -9,10 +9,12 @@ Takes 3 minutes.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from scipy.stats import binomtest
 
-from benchmarks.table.shipped_table import FRESH, simulate_as_users
+from benchmarks.table.shipped_table import as_reached, inside, kept, robots
 from surrogate.held_out import COMPARED, error_table
 from surrogate.intervals import COVERAGE
 from surrogate.table_file import load
@@ -23,14 +25,15 @@ ROWS = 16384
 FAR = 0.03  # from COVERAGE
 
 
-def main(model: str | None = None) -> None:
+def main(model: str | None = None, work: str | None = None) -> None:
     lookup = load(model)
     rows = lookup.provenance["rows"]
     print(f"\nLook-up table {lookup.identity}: {rows['train']} rows learned, errors on {rows['held_out']} others")
     print(error_table(lookup.errors))
     outside = np.mean(lookup.query(draw_robots(ROWS, 5, wide=False), flag=True)["outside"])
     print(f"robots of the domain that it refuses: {100 * outside:.1f} %")
-    fresh = simulate_as_users(lookup, *FRESH, title="fresh robots")
+    drawn = kept(Path(work), "fresh") if work else as_reached(robots("fresh"), title="fresh robots")
+    fresh = inside(lookup, drawn)
     print(f"\nCoverage of intervals for {100 * COVERAGE:.0f} % on {len(fresh)} fresh robots")
     print(f"couple N third robots{''.join(f'{name:>14}' for name in COMPARED)}")
     far, clearly, cells = 0, 0, 0

@@ -1,14 +1,15 @@
 """Train the look-up table that comes with the package, and evaluate it on held-out robots.
 
-Usage: softflagella sweep --config surrogate/shipped/domain.toml --out SWEEP
-       python -m benchmarks shipped_table WORK --sweep SWEEP --out MODEL    simulate the rest (kept in WORK), train
+Usage: python -m benchmarks shipped_table WORK --response TABLE --out MODEL    keeps the response of TABLE
+       softflagella sweep --config surrogate/shipped/domain.toml --out SWEEP
+       python -m benchmarks shipped_table WORK --sweep SWEEP --out MODEL    the response is learned, too
        python -m benchmarks shipped_table WORK --calibrate MODEL [--out MODEL]    its intervals alone, anew
        python -m benchmarks shipped_table WORK --test MODEL [--card CARD]
 
---test prints errors on robots of the test set; `python -m benchmarks lookup` the coverage of the intervals. The
-shipped file was made by an earlier version of this program. It learned the spread over the disc's phase apart,
-from domain.toml with 8192 rows, the seed 20261123, N = 2 and a history every 64 rows, the tails again after the
-response, and the intervals at last.
+Sets that are simulated are kept in WORK. --test prints errors on robots of the test set; `python -m benchmarks
+lookup` the coverage of the intervals. The shipped file was made by the first command, with the response that an
+earlier version of this program learned: the spread over the disc's phase apart, from domain.toml with 8192 rows,
+the seed 20261123, N = 2 and a history every 64 rows.
 
 The tails are learned from robots with heads far wider than those of the domain, a single tail also from robots of
 the domain, half of which have effects on head and motor, and from 8192 robots with all these effects and a surface
@@ -17,7 +18,7 @@ effects, and from robots with such a couple, half of them with one tail; the int
 drawn as users draw them. The response to a flip is learned from the sweep, and from some of the wide robots. All
 robots are drawn from Sobol sequences with the seeds below. The test set led to no choice of any kind.
 
-Takes two hours with its simulations.
+Takes two and a half hours of two cores with its simulations.
 """
 
 from __future__ import annotations
@@ -50,19 +51,25 @@ from surrogate.training.simulated import (
     read_robots,
     simulate_robots,
 )
-from surrogate.training.train import held_out_curve_errors, learn, recalibrated, split, with_radius
+from surrogate.training.train import (
+    held_out_curve_errors,
+    learn,
+    recalibrated,
+    split,
+    with_radius,
+    with_tails,
+)
 
-TAILS = Settings(width=64, depth=3, members=1, epochs=60, iterations=3000)
-SINGLE = replace(TAILS, iterations=6000)
+TAILS = Settings(width=64, depth=3, members=1, epochs=60, iterations=6000)
 CURVES = Settings(width=64, depth=2, members=1, epochs=60, iterations=1500)
 ROWS = {
-    "tails": (32768, 101), "single": (16384, 505), "couples": (8192, 606),
+    "tails": (98304, 101), "single": (16384, 505), "couples": (8192, 606),
     "widths": (8192, 202), "widths_couples": (6144, 911),
     "held_out": (8192, 402), "held_out_couples": (2048, 912),
     "locked": (4096, 20261205),
 }  # fmt: skip
 FLIPS = {"flips": (1400, 301), "locked_flips": (400, 20261202)}
-CALIBRATION, FRESH = (49152, 7001), (32768, 8002)  # robots drawn as users draw them, and seeds
+AS_USERS = {"calibration": (65536, 7001), "fresh": (65536, 8002)}
 _HALF_WITH_EFFECTS = ("single", "widths", "held_out")
 _LEARNED = ("tails", "single", "couples")
 _WIDTHS, _HELD_OUT = ("widths", "widths_couples"), ("held_out", "held_out_couples")
@@ -85,6 +92,8 @@ def robots(name: str) -> dict[str, Floats]:
         np.random.default_rng(seed).shuffle(tails)
         every = {**draw_robots(_FLIPS_DRAWN, seed, wide=True), "N": tails}
         return {n: np.asarray(values[:count]) for n, values in every.items() if n not in _STEADY_ONLY}
+    if name in AS_USERS:
+        return draw_as_users(*AS_USERS[name])
     count, seed = ROWS[name]
     drawn = draw_robots(count, seed, wide=name == "tails", effects=name != "locked")
     if name in _HALF_WITH_EFFECTS:  # every second robot of a Sobol sequence has a small C_r
@@ -160,18 +169,15 @@ def test(lookup: NeuralTable, rows: SimulatedRobots, flips: SimulatedRobots) -> 
         print(f"  {name:16}" + "".join(f"  {k} {100 * v:.3f}" for k, v in figures.items()))
 
 
-def simulate_as_users(lookup: NeuralTable, count: int, seed: int, *, title: str = "") -> SimulatedRobots:
-    """Simulate robots drawn as users draw them; those outside the domain of a table are left out."""
-    drawn = draw_as_users(count, seed)
-    inside = lookup.solve(drawn).outside == INSIDE
-    return as_reached({name: values[inside] for name, values in drawn.items()}, title=title)
+def inside(lookup: NeuralTable, rows: SimulatedRobots) -> SimulatedRobots:
+    """Return the robots inside the domain of a table."""
+    return rows.at(lookup.solve(rows.robots).outside == INSIDE)
 
 
-def with_intervals_of_users(lookup: NeuralTable, *, title: str = "") -> NeuralTable:
+def with_intervals_of_users(lookup: NeuralTable, work: Path) -> NeuralTable:
     """Return a table with intervals that are calibrated on robots drawn as users draw them."""
-    count, seed = CALIBRATION
-    rows = simulate_as_users(lookup, count, seed, title=title)
-    source = {"robots": len(rows), "seed": seed}
+    rows = inside(lookup, kept(work, "calibration"))
+    source = {"robots": len(rows), "seed": AS_USERS["calibration"][1]}
     return replace(recalibrated(lookup, rows), provenance={**lookup.provenance, "intervals": source})
 
 
@@ -215,27 +221,34 @@ def main(*words: str) -> None:
     parser.add_argument("work", type=Path)
     parser.add_argument("--out")
     parser.add_argument("--sweep", help="data set built from surrogate/shipped/domain.toml")
+    parser.add_argument("--response", help="table whose response to a flip is kept, instead of a sweep")
     parser.add_argument("--calibrate", help="table whose intervals alone are learned anew")
     parser.add_argument("--test")
     parser.add_argument("--card", help="with --test: write the card, from held-out and fresh robots of the domain")
     arguments = parser.parse_args(words)
     if arguments.calibrate:
-        lookup = with_intervals_of_users(load(arguments.calibrate), title="intervals")
+        lookup = with_intervals_of_users(load(arguments.calibrate), arguments.work)
         lookup.save(arguments.out or arguments.calibrate)
     elif arguments.out:
-        if not arguments.sweep:
-            parser.error("--out needs --sweep")
+        if bool(arguments.sweep) == bool(arguments.response):
+            parser.error("--out needs --sweep or --response")
         steady, widths, held_out = (_joined(arguments.work, names) for names in (_LEARNED, _WIDTHS, _HELD_OUT))
-        flips = kept(arguments.work, "flips")
-        source = {"seeds": {**ROWS, **FLIPS}, "data_hash": read_manifest(arguments.sweep)["config_hash"]}
-        learned, swept_held_out = swept(arguments.sweep)
-        lookup = learn(
-            steady, widths, held_out, join_robots([flips, learned]), TAILS, CURVES,
-            single_settings=SINGLE, source=source,
-            flips_held_out=swept_held_out, context=TrainingContext("train", folder=arguments.work / "states"),
-        )  # fmt: skip
+        context = TrainingContext("train", folder=arguments.work / "states")
+        if arguments.response:
+            lookup = with_tails(
+                load(arguments.response), steady, widths, held_out, TAILS,
+                source={"seeds": ROWS}, context=context,
+            )  # fmt: skip
+        else:
+            flips = kept(arguments.work, "flips")
+            source = {"seeds": {**ROWS, **FLIPS}, "data_hash": read_manifest(arguments.sweep)["config_hash"]}
+            learned, swept_held_out = swept(arguments.sweep)
+            lookup = learn(
+                steady, widths, held_out, join_robots([flips, learned]), TAILS, CURVES,
+                source=source, flips_held_out=swept_held_out, context=context,
+            )  # fmt: skip
         lookup = with_response_errors(lookup, title="errors of the response")
-        lookup = with_intervals_of_users(lookup, title="intervals")
+        lookup = with_intervals_of_users(lookup, arguments.work)
         lookup.save(arguments.out)
         remove_states(arguments.work / "states")
         print(error_table(lookup.errors))
@@ -244,5 +257,5 @@ def main(*words: str) -> None:
         test(lookup, locked, kept(arguments.work, "locked_flips"))
     if arguments.card:
         lookup = load(arguments.test)
-        fresh = simulate_as_users(lookup, *FRESH, title="fresh robots")
+        fresh = inside(lookup, kept(arguments.work, "fresh"))
         write_text(arguments.card, model_card(lookup, _joined(arguments.work, _HELD_OUT), fresh))

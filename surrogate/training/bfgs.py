@@ -1,8 +1,9 @@
 """Minimise a smooth function of some thousand numbers: the BFGS method with its whole matrix, self-scaled.
 
 L-BFGS keeps the last steps only. On the loss of a look-up table it then needs many times as many iterations: the
-matrix of all steps knows the narrow valleys of this loss. The matrix has n² numbers (0.7 GB for n = 9,000), and an
-iteration reads it once and writes it once, which takes about as long as the loss and its gradient.
+matrix of all steps knows the narrow valleys of this loss. The matrix is symmetric, so half of its n² numbers are
+kept (0.35 GB for n = 9,000), in strips that fit into a processor's cache. An iteration reads and writes each strip
+once.
 
 Where the curvature along a step is smaller than the matrix says, the matrix is scaled before it is updated.
 Source: Oren and Luenberger (1974); Al-Baali (1998); for networks Urbán, Stefanou and Pons (2025). The line search
@@ -27,7 +28,55 @@ _CURVATURE = 0.9  # of the Wolfe conditions
 _DECREASE = 1e-4  # of the slope: what counts as a step
 _SEARCHES = 15  # trial steps of a line search
 _HALVINGS = 40  # of a step, where there is none for the Wolfe conditions
-_STATE = ("x", "value", "gradient", "_matrix", "_direction")
+_STATE = ("x", "value", "gradient", "_direction")
+_STRIP = 64  # rows
+
+
+class SymmetricMatrix:
+    """A symmetric matrix (n, n), in strips up to the diagonal; an update waits for the next product."""
+
+    def __init__(self, count: int, size: float, like: Tensor):
+        height = _STRIP if like.device.type == "cpu" else count
+        self.strips = [
+            torch.zeros(
+                min(height, count - first), min(first + height, count), dtype=like.dtype, device=like.device
+            )
+            for first in range(0, count, height)
+        ]
+        for strip in self.strips:
+            strip.diagonal(strip.shape[1] - len(strip)).fill_(size)
+        self._waiting: tuple[float, Tensor, Tensor] | None = None
+
+    def update(self, scale: float, a: Tensor, b: Tensor) -> None:
+        """Make it `scale` times itself plus a bᵀ + b aᵀ, each (n,)."""
+        assert self._waiting is None
+        self._waiting = scale, torch.stack([a, b], 1), torch.stack([b, a])
+
+    def times(self, vector: Tensor) -> Tensor:
+        """Compute the product with a vector (n,)."""
+        result, waiting = torch.zeros_like(vector), self._waiting
+        for strip in self.strips:
+            last = strip.shape[1]
+            first = last - len(strip)
+            if waiting:
+                scale, columns, rows = waiting
+                strip.addmm_(columns[first:last], rows[:, :last], beta=scale)
+            result[first:last].addmv_(strip, vector[:last])
+            if first:
+                result[:first].addmv_(strip[:, :first].T, vector[first:last])
+        self._waiting = None
+        return result
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return all that it depends on."""
+        return {"strips": self.strips, "waiting": self._waiting}
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Resume from a state of a matrix of the same size."""
+        for mine, other in zip(self.strips, state["strips"], strict=True):
+            mine.copy_(other)
+        waiting, device = state["waiting"], self.strips[0].device
+        self._waiting = waiting and (waiting[0], *(part.to(device) for part in waiting[1:]))
 
 
 class Minimiser:
@@ -37,18 +86,23 @@ class Minimiser:
         self.function = function
         self.x = x
         self.value, self.gradient = function(x)
-        self._matrix: Tensor | None = None  # (n, n); None: steepest descent
+        self._matrix: SymmetricMatrix | None = None  # None: steepest descent
         self._direction = _downhill(self.gradient)
 
     def state_dict(self) -> dict[str, Any]:
         """Return all that the next step depends on."""
-        return {name: getattr(self, name) for name in _STATE}
+        matrix = self._matrix and self._matrix.state_dict()
+        return {**{name: getattr(self, name) for name in _STATE}, "matrix": matrix}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Resume from a state of the same function."""
         for name in _STATE:
             value = state[name]
             setattr(self, name, value.to(self.x.device) if isinstance(value, Tensor) else value)
+        self._matrix = None
+        if state["matrix"]:
+            self._matrix = SymmetricMatrix(len(self.x), 1.0, self.x)
+            self._matrix.load_state_dict(state["matrix"])
 
     def step(self) -> bool:
         """Perform one iteration; return False where no step along the gradient makes the value smaller."""
@@ -106,23 +160,21 @@ class Minimiser:
         change = gradient - self.gradient
         curvature = float(step @ change)
         if not curvature > 0:  # a halved step: it says nothing of the matrix
-            self._direction = _downhill(gradient) if self._matrix is None else -(self._matrix @ gradient)
+            self._direction = _downhill(gradient) if self._matrix is None else -self._matrix.times(gradient)
             return
         if self._matrix is None:
             size = curvature / float(change @ change)
-            self._matrix = torch.eye(len(step), dtype=step.dtype, device=step.device) * size
+            self._matrix = SymmetricMatrix(len(step), size, step)
             moved, expected = size * gradient, curvature
             carried = size * change
         else:
-            moved = self._matrix @ gradient
+            moved = self._matrix.times(gradient)
             carried = moved + self._direction  # the matrix times `change`
             expected = -length * float(step @ self.gradient)  # curvature of the matrix along the step
         scale = max(expected / curvature, 1.0)
         outer = -scale / curvature * carried
         outer += 0.5 * (scale * float(change @ carried) / curvature + 1) / curvature * step
-        columns = torch.stack([step, outer], 1)
-        rows = torch.stack([outer, step])
-        self._matrix.addmm_(columns, rows, beta=scale)
+        self._matrix.update(scale, step, outer)
         self._direction = -(scale * moved + step * (outer @ gradient) + outer * (step @ gradient))
 
 

@@ -49,6 +49,7 @@ Show = Callable[[Any], None]  # the network of now on the progress bar
 Residual = Callable[..., Tensor]  # y (K, m, O), and data of the same m rows -> r (K, m, D)
 _POWER = 0.25
 _SOFTEST, _HARDEST = 0.1, 5e-4  # ε
+_ROWS = 4096  # whose layers fit into a processor's cache
 _STAGE = 50  # BFGS iterations between two steps of the progress bar
 _LEVEL = 0.95  # of the rows: the error that the bar shows
 
@@ -350,9 +351,12 @@ def _polish(
 
     def value_and_gradient(point: Tensor) -> tuple[float, Tensor]:
         vector_to_parameters(point, parameters)
-        value = problem.loss(alone, everything, _HARDEST)
-        slopes = torch.autograd.grad(value, parameters)
-        return value.item(), parameters_to_vector(slopes).detach()
+        value, slopes = 0.0, torch.zeros_like(point)
+        for rows in torch.split(everything, _ROWS if point.device.type == "cpu" else len(everything)):
+            part = problem.loss(alone, rows, _HARDEST) * (len(rows) / len(everything))
+            slopes += parameters_to_vector(torch.autograd.grad(part, parameters)).detach()
+            value += part.item()
+        return value, slopes
 
     minimiser = Minimiser(value_and_gradient, parameters_to_vector(parameters).detach())
     first = 1

@@ -36,6 +36,7 @@ from surrogate.training.simulated import SimulatedRobots, join_robots, read_robo
 _MIN_INSIDE = 10
 _MIN_FLIPS = 200  # robots, for the covariance of the errors of the response
 _MIN_ROWS, _MIN_OF_A_CLASS = 64, 16
+_OF_RESPONSE = ("code_version", "data_hash", "spread")  # what the provenance of a table says of its response
 _QUIET = TrainingContext()
 
 
@@ -124,7 +125,6 @@ def learn(
     settings: Settings | None = None,
     curve_settings: Settings | None = None,
     *,
-    single_settings: Settings | None = None,
     flips_held_out: SimulatedRobots | None = None,
     source: dict[str, Any] | None = None,
     context: TrainingContext = _QUIET,
@@ -136,7 +136,6 @@ def learn(
         width_rows: robots for the local widths of the intervals.
         held_out: robots for the errors and the factor of the intervals.
         flipped: robots with response curves.
-        single_settings: of the network of robots with one tail; by default `settings`.
         flips_held_out: robots with curves for the errors of the response; by default a tenth of `flipped`.
         source: more provenance.
         context: device, progress bars, and where states are kept.
@@ -148,7 +147,7 @@ def learn(
     rows, _ = _learnable(learned)
     classes = len(np.unique(network_index(rows.robots.number)))
     context = replace(context, networks=classes + 1 + len(PARTS))  # one of the gap, and those of the response
-    table = fit_wrench(rows, wrench_settings, context, single_settings=single_settings)
+    table = fit_wrench(rows, wrench_settings, context)
     flipped, flips_held_out = _several_tails(flipped), _several_tails(flips_held_out)
     flips, usable = _learnable(flipped)
     response = fit_response(flips, flipped.at(usable).curves, response_settings, context.part("flips"))
@@ -158,10 +157,8 @@ def learn(
         "held_out": len(held_out),
         "flips": len(flips.motion),
     }
-    created = provenance({
-        "tails": asdict(wrench_settings), "single": asdict(single_settings or wrench_settings),
-        "curves": asdict(response_settings), "device": context.device,
-    })  # fmt: skip
+    of_response = asdict(response_settings)
+    created = provenance({"tails": asdict(wrench_settings), "curves": of_response, "device": context.device})
     lookup = NeuralTable(
         tails=table,
         curves=response,
@@ -172,6 +169,43 @@ def learn(
         provenance={**created, **(source or {}), "rows": counts},
     )
     return _judged(lookup, width_rows, held_out, flips_held_out)
+
+
+def with_tails(
+    lookup: NeuralTable,
+    learned: SimulatedRobots,
+    width_rows: SimulatedRobots,
+    held_out: SimulatedRobots,
+    settings: Settings,
+    *,
+    source: dict[str, Any] | None = None,
+    context: TrainingContext = _QUIET,
+) -> NeuralTable:
+    """Return a table with steady motions learned anew; its response to a flip, which depends on none, stays.
+
+    Args:
+        lookup: the table that gives the response and its errors.
+        learned, width_rows, held_out, settings, source, context: as for `learn`.
+    """
+    rows, _ = _learnable(learned)
+    tails = fit_wrench(rows, settings, context)
+    counts = {"train": len(rows.motion), "widths": len(width_rows), "held_out": len(held_out)}
+    of_response = lookup.provenance["config"]["curves"]
+    created = provenance({"tails": asdict(settings), "curves": of_response, "device": context.device})
+    learned_first = {name: lookup.provenance[name] for name in _OF_RESPONSE if name in lookup.provenance}
+    again = replace(
+        lookup,
+        tails=tails,
+        support=_supports(rows),
+        ranges=_ranges(learned),
+        provenance={
+            **created,
+            **(source or {}),
+            "response": lookup.provenance.get("response", learned_first),
+            "rows": {**lookup.provenance["rows"], **counts},
+        },
+    )
+    return _with_intervals(again, width_rows, held_out)
 
 
 def _supports(rows: WrenchSamples) -> tuple[Support | None, ...]:

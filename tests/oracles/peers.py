@@ -25,7 +25,7 @@ _CRITERIA = ("BIC", "AICc", "F-tests")
 _LEVELS = {"": False, ", a level a session": True}
 LEAST_SQUARES = tuple(f"{criterion}{levels}" for criterion in _CRITERIA for levels in _LEVELS)
 NEEDS = {**dict.fromkeys(LEAST_SQUARES, "lmfit"), MIXED: "statsmodels", SINDY: "pysindy"}
-_ALPHA, _TAIL = 0.01, 1.959964  # level of the F-tests; of a 95 % interval
+_ALPHA, TAIL = 0.01, 1.959964  # level of the F-tests; of a 95 % interval
 _STEP = 1e-4  # of derivatives, in typical sizes
 
 
@@ -119,38 +119,45 @@ def least_squares(table: Measured, effects: Sequence[str], *, levels: bool) -> A
     return lmfit.minimize(residual, parameters, method="leastsq", max_nfev=2000)
 
 
-def _sets(table: Measured) -> Iterator[tuple[str, ...]]:
+def sets_of(names: Sequence[str]) -> Iterator[tuple[str, ...]]:
     """List no effect, each, and each pair."""
-    names = [effect.name for effect in table.model.effects]
     return (some for count in range(3) for some in combinations(names, count))
 
 
 def _intervals(table: Measured, fitted: Any) -> dict[str, tuple[float, float]]:
     shared = [number.name for number in table.model.numbers if number.name not in table.own]
     found = {name: (fitted.params[name].value, fitted.params[name].stderr) for name in shared}
-    return {n: (v - _TAIL * s, v + _TAIL * s) for n, (v, s) in found.items() if s is not None}
+    return {n: (v - TAIL * s, v + TAIL * s) for n, (v, s) in found.items() if s is not None}
 
 
 def by_least_squares(table: Measured) -> dict[str, Finding]:
     """Choose among all fits by each criterion."""
     answers: dict[str, Finding] = {}
     for words, levels in _LEVELS.items():
-        fits = {some: least_squares(table, some, levels=levels) for some in _sets(table)}
-
-        def corrected(fit: Any) -> float:
-            k = fit.nvarys + 1
-            return float(fit.aic + 2 + 2 * k * (k + 1) / max(fit.ndata - k - 1, 1))
-
-        chosen = {
-            "BIC": min(fits, key=lambda some: fits[some].bic),
-            "AICc": min(fits, key=lambda some: corrected(fits[some])),
-            "F-tests": forwards(fits),
+        fits = {
+            some: least_squares(table, some, levels=levels)
+            for some in sets_of([e.name for e in table.model.effects])
         }
+        chosen = by_criteria(fits)
         answers |= {
             f"{how}{words}": Finding(frozenset(some), _intervals(table, fits[some]))
             for how, some in chosen.items()
         }
     return answers
+
+
+def by_criteria(fits: Mapping[tuple[str, ...], Any]) -> dict[str, tuple[str, ...]]:
+    """Choose among fits, each with numbers as a result of lmfit has them, by each of the criteria."""
+
+    def corrected(fit: Any) -> float:
+        k = fit.nvarys + 1
+        return float(fit.aic + 2 + 2 * k * (k + 1) / max(fit.ndata - k - 1, 1))
+
+    return {
+        "BIC": min(fits, key=lambda some: fits[some].bic),
+        "AICc": min(fits, key=lambda some: corrected(fits[some])),
+        "F-tests": forwards(fits),
+    }
 
 
 def forwards(fits: Mapping[tuple[str, ...], Any]) -> tuple[str, ...]:
@@ -179,7 +186,7 @@ def by_mixed_model(table: Measured) -> dict[str, Finding]:
     slopes = {n: (table.predict({**base, n: base[n] + _STEP * s}) - at) / _STEP for n, s in steps.items()}
     groups, fits = np.tile(table.session, len(table.model.outputs)), {}
     numbers = list(table.start())
-    for some in _sets(table):
+    for some in sets_of([e.name for e in table.model.effects]):
         columns = np.column_stack([slopes[name] for name in (*numbers, *some)])
         # Powell's search: the default one diverges where levels hardly scatter. Some fits have a singular matrix.
         with warnings.catch_warnings(), suppress(np.linalg.LinAlgError):
@@ -192,7 +199,7 @@ def by_mixed_model(table: Measured) -> dict[str, Finding]:
     fitted, found = fits[chosen], {}
     for place, name in enumerate(numbers):
         change, error = (steps[name] * float(each[place]) for each in (fitted.fe_params, fitted.bse_fe))
-        found[name] = (base[name] + change - _TAIL * error, base[name] + change + _TAIL * error)
+        found[name] = (base[name] + change - TAIL * error, base[name] + change + TAIL * error)
     return {MIXED: Finding(frozenset(chosen), found)}
 
 

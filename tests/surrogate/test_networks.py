@@ -22,7 +22,7 @@ from common.errors import InputError
 from surrogate.network import Ensemble, state_shapes
 from surrogate.table import NeuralTable
 from surrogate.training import fits
-from surrogate.training.bfgs import Minimiser
+from surrogate.training.bfgs import Minimiser, SymmetricMatrix
 from surrogate.training.networks import (
     Checkpoint,
     Problem,
@@ -221,6 +221,21 @@ def test_networks_answer_alike_in_loops_and_with_torch(inputs: int, width: int, 
     assert {k: a.tolist() for k, a in trainable.trained().state.items()} == {
         k: a.tolist() for k, a in network.state.items()
     }
+
+
+@pytest.mark.parametrize("count", [1, 3, 64, 65, 200])
+def test_a_symmetric_matrix_in_strips_is_that_matrix(count: int) -> None:
+    rng = torch.Generator().manual_seed(count)
+    a, b, vector = (torch.randn(count, generator=rng, dtype=torch.float64) for _ in range(3))
+    matrix, whole = SymmetricMatrix(count, 0.3, a), 0.3 * torch.eye(count, dtype=torch.float64)
+    assert torch.allclose(matrix.times(vector), whole @ vector, rtol=1e-13)
+    for scale in (1.0, 1.7):
+        matrix.update(scale, a, b)
+        other = SymmetricMatrix(count, 1.0, a)
+        other.load_state_dict(matrix.state_dict())
+        whole = scale * whole + torch.outer(a, b) + torch.outer(b, a)
+        assert torch.allclose(matrix.times(vector), whole @ vector, rtol=1e-12, atol=1e-12)
+        assert torch.equal(other.times(a), matrix.times(a))
 
 
 def rosenbrock(x: Tensor) -> tuple[float, Tensor]:

@@ -78,10 +78,7 @@ def test_robots_that_couples_turn_against_their_tails_are_learned_with_one_tail_
 def test_a_single_tail_is_learned_beside_several() -> None:
     several = rows(256, 13, wide=False)
     held = join_robots([several, turned(1.0, 18)])
-    few = replace(TAILS, epochs=20, iterations=40)
-    found = training.learn(
-        join_robots([several, turned(1.0)]), held, held, flips(), few, CURVES, single_settings=TAILS
-    )
+    found = training.learn(join_robots([several, turned(1.0)]), held, held, flips(), TAILS, CURVES)
     fresh = turned(1.0, 19)
     answer = found.query(fresh.robots, intervals=True, flag=True)
     wanted, inside = fresh.motion["omega_yr_bar"], ~answer["outside"]
