@@ -8,12 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from common.arrays import Floats
 from planner.jobs.plan import plan
 from planner.paths.path import Path2D, circle, polygon
 from planner.planning.plan import Plan
-from planner.planning.stated_error import WOBBLE, plan_errors, predicted_error
+from planner.planning.stated_error import WOBBLE, error_growth, plan_errors, predicted_error
 from planner.vehicle.from_table import table_vehicle
-from planner.vehicle.vehicle import roll_out
+from planner.vehicle.tracked_point import TrackedVehicle
+from planner.vehicle.vehicle import Rollout, Switches, roll_out
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from surrogate.table import NeuralTable
@@ -28,7 +30,8 @@ class Carried(NamedTuple):
     kind: str  # of the path
     result: Plan
     own_stated: float  # stated error of the same schedule with the robot's own table
-    found: float  # largest distance from the declared path, with the motion within a revolution of the disc
+    # Largest distance from the declared path, at one phase of the disc, with the motion within its revolution.
+    found: float
 
     @property
     def held(self) -> bool:
@@ -126,6 +129,18 @@ def carried(seed: int, lookup: NeuralTable) -> Carried:
     own = tabulate(robot)
     tracked = result.tracked._replace(vehicle=table_vehicle(robot, own))
     errors = plan_errors(tracked, result.drawn, result.declared, result.switches, guaranteed=None, seed=0)
-    track = roll_out(tracked.vehicle, result.switches, tracked.offset).track
+    rollout = roll_out(tracked.vehicle, result.switches, tracked.offset)
+    track = rollout.track + _of_a_phase(rng, tracked, result.switches, rollout)
     found = predicted_error(result.reference, track, closed=result.drawn.closed).largest
     return Carried(kind, result, errors.stated, found + WOBBLE)
+
+
+def _of_a_phase(rng: np.random.Generator, tracked: TrackedVehicle, switches: Switches, rollout: Rollout) -> Floats:
+    """Draw the disc's phase at the first flip for each direction; return what it moves the track, (K, 2)."""
+    growth = error_growth(replace(tracked.vehicle, modes=()), switches, rollout)
+    angle = rng.uniform(0, 2 * np.pi, 2)
+    waves = np.sqrt(2) * np.stack([np.cos(angle), np.sin(angle)], 1).ravel()
+    moved = np.einsum("p,epi->ei", waves, growth.deviation)
+    samples = (len(rollout.track) - 1) // len(switches.dwells)
+    place = np.arange(len(rollout.track)) / samples
+    return np.stack([np.interp(place, growth.flips, part) for part in moved.T], 1)
