@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import signal
 import threading
 import time
@@ -46,7 +47,8 @@ from dataset.workers import Backend, Chunk, Simulate, compile_on_this_host
 KILLS = 3  # dead workers after which a chunk is set aside
 PATIENCE = 60.0  # seconds without any worker
 _POLL = 0.2  # seconds
-_MAX_ROWS, _CHUNKS = 1024, 4  # rows of a chunk, and chunks of a worker where there are few rows
+_CHUNKS = 4  # of a worker, at least
+_MAX_ROWS, _FILES = 1024, 4096  # rows of a chunk, unless the data set then has more files than the second number
 _STANDARD = "dataset.simulate.simulate"  # in the key of every row and in sweep.json: part of the format
 
 
@@ -165,8 +167,7 @@ class _Build:
 
     def _fill(self, gaps: Sequence[tuple[int, int]], backend: Backend) -> None:
         """Simulate the rows of gaps, in chunks."""
-        share = -(-sum(stop - start for start, stop in gaps) // (_CHUNKS * max(backend.slots(), 1)))
-        grid = [min(_MAX_ROWS, share), self._rows]
+        grid = [chunk_rows(self._rows, sum(stop - start for start, stop in gaps), backend.slots()), self._rows]
         if self._sweep.get("grid") != grid:  # workers that a dead build has left see it, and write nothing
             self._sweep["grid"] = grid
             self._write_sweep()
@@ -261,6 +262,17 @@ class _Build:
         if CARD not in self.folder.names() or manifest["digest"].encode() not in self.folder.read(CARD):
             write_card(self.folder)
         return manifest
+
+
+def chunk_rows(rows: int, missing: int, workers: int) -> int:
+    """Return the rows of a chunk: some chunks for each worker; of many rows few files, as the head lists each.
+
+    Args:
+        rows: of the data set.
+        missing: rows that are to be simulated.
+        workers: that simulate at once.
+    """
+    return min(max(_MAX_ROWS, math.ceil(rows / _FILES)), math.ceil(missing / (_CHUNKS * max(workers, 1))))
 
 
 def run(chunks: Sequence[Chunk], backend: Backend, show: Callable[[str], object]) -> Iterator[Part]:

@@ -3,7 +3,8 @@
 1. Rows of sweep.toml on dask across four processes of this machine, and on one process: rows a second, processor
    time and memory of the head (the process that schedules; with dask the scheduler is in it).
 2. Processor time by part, of a build in one process.
-3. Synthetic rows, which take no time to simulate: processor time of the head for a file, memory for a row.
+3. Synthetic rows, which take no time to simulate, in files of 1,024 and of 4,096: processor time and memory of the
+   head for a file, and for a row.
 4. Cost of 10⁶ and 10⁷ rows on 100 and 1,000 cores, from these figures.
 
 Usage: python -m benchmarks scale [ROWS] [DASK_WORKERS]
@@ -22,22 +23,28 @@ from tempfile import TemporaryDirectory
 from typing import NamedTuple
 from unittest.mock import patch
 
+import numpy as np
+
 from benchmarks.common import ROOT, heading, row
-from dataset.build import build
+from common.arrays import Floats
+from dataset.build import build, chunk_rows
 from dataset.design import load_design
 from sim.threads import available_jobs
 from tests.dataset import sweeps
 
 _PROFILED, _SYNTHETIC = 4096, (100_000, 400_000)
-_FILE = 1024  # rows
+_SHORT, _LONG = 1024, 4096  # rows of a file
 _BUILD = """
 import json, re, sys, time
 from pathlib import Path
+import dataset.build
 from dataset.build import build
 from dataset.design import load_design
 from tests.dataset import sweeps
 out, backend = sys.argv[1:3]
 rows, jobs, synthetic = map(int, sys.argv[3:])
+if synthetic:
+    dataset.build._MAX_ROWS = synthetic
 began, spent = time.perf_counter(), time.process_time()
 if synthetic:
     made = build(sweeps.design(rows), out, backend=backend, jobs=jobs, title="", simulate=sweeps.invented)
@@ -69,14 +76,36 @@ class Built(NamedTuple):
     files: int
 
 
-def built(rows: int, backend: str, jobs: int, *, synthetic: bool = False) -> Built:
-    """Build rows in a new process."""
+def built(rows: int, backend: str, jobs: int, *, synthetic: int = 0) -> Built:
+    """Build rows in a new process; synthetic ones in files of so many, unless 0."""
     with TemporaryDirectory() as folder:
-        words = [f"{folder}/out", backend, str(rows), str(jobs), str(int(synthetic))]
+        words = [f"{folder}/out", backend, str(rows), str(jobs), str(synthetic)]
         done = subprocess.run(
             [sys.executable, "-c", _BUILD, *words], cwd=ROOT, capture_output=True, text=True, check=True
         )
         return Built(*json.loads(done.stdout.splitlines()[-1]))
+
+
+class Head(NamedTuple):
+    """Processor time [s] and memory [MiB] of the head, each (2,)."""
+
+    at_all: Floats
+    a_file: Floats
+    a_row: Floats
+
+    @classmethod
+    def measured(cls, processes: int) -> Head:
+        """Measure it with few rows, and with many in many and in few files."""
+        few, many = _SYNTHETIC
+        runs = [built(rows, "dask", processes, synthetic=file)
+                for rows, file in ((few, _SHORT), (many, _SHORT), (many, _LONG))]  # fmt: skip
+        parts = [[1.0, run.files, rows] for run, rows in zip(runs, (few, many, many), strict=True)]
+        return cls(*np.linalg.solve(parts, [[run.head, run.memory] for run in runs]))
+
+    def of(self, rows: int, files: int) -> tuple[float, float]:
+        """Compute both for a data set."""
+        seconds, memory = self.at_all + files * self.a_file + rows * self.a_row
+        return float(seconds), float(memory)
 
 
 def by_part(rows: int) -> dict[str, float]:
@@ -105,18 +134,22 @@ def main(rows: str = "100000", workers: str = "4") -> None:
     print(f"\n{heading('part', 'µs a row')}")
     for name, seconds in parts.items():
         print(row(name, f"{1e6 * seconds:.0f}"))
-    small, large = (built(size, "dask", processes, synthetic=True) for size in _SYNTHETIC)
-    files, more = large.files - small.files, _SYNTHETIC[1] - _SYNTHETIC[0]
-    of_a_file, of_a_row = (large.head - small.head) / files, (large.memory - small.memory) / more
-    print(f"\nhead, synthetic rows on dask: {1e3 * of_a_file:.1f} ms of processor time a file of {_FILE} rows, "
-          f"{1024 * of_a_row:.2f} KiB a row, {small.memory:.0f} MiB at {_SYNTHETIC[0]} rows")  # fmt: skip
+    head = Head.measured(processes)
+    print(
+        f"\nhead, synthetic rows on dask: {1e3 * head.a_file[0]:.1f} ms of processor time and "
+        f"{1024 * head.a_file[1]:.0f} KiB a file, {1e6 * head.a_row[0]:.1f} µs and "
+        f"{1024 * head.a_row[1]:.2f} KiB a row, beside {head.at_all[0]:.1f} s and {head.at_all[1]:.0f} MiB"
+    )
     in_workers = sum(seconds for name, seconds in parts.items() if name not in _HEAD)
-    print(f"\n{heading('rows', 'cores', 'core hours', 'wall clock', 'head: busy', 'head: memory')}")
+    print(
+        "\n" + heading("rows", "cores", "rows of a file", "core hours", "wall clock", "head: busy", "head: memory")
+    )
     for size in (10**6, 10**7):
         for cores in (100, 1000):
-            # the last chunks end one after another: half a chunk more, on average
-            wall = (size + _FILE / 2 * cores) * in_workers / cores
-            head = size / _FILE * of_a_file
-            memory = small.memory + (size - _SYNTHETIC[0]) * of_a_row
-            print(row(f"{size:,}", cores, f"{size * in_workers / 3600:.1f}", f"{max(wall, head) / 60:.1f} min",
-                      f"{100 * head / max(wall, head):.0f} %", f"{memory / 1024:.1f} GiB"))  # fmt: skip
+            for of_a_file in dict.fromkeys((_SHORT, chunk_rows(size, size, cores))):
+                # the last chunks end one after another: half a chunk more, on average
+                wall = (size + of_a_file / 2 * cores) * in_workers / cores
+                busy, memory = head.of(size, size // of_a_file)
+                print(row(f"{size:,}", cores, of_a_file, f"{size * in_workers / 3600:.1f}",
+                          f"{max(wall, busy) / 60:.1f} min", f"{100 * busy / max(wall, busy):.0f} %",
+                          f"{memory / 1024:.1f} GiB"))  # fmt: skip

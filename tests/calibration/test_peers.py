@@ -12,6 +12,7 @@ from tests.oracles import peers
 from tests.oracles.drawn_falls import declared, fall, falls
 from tests.oracles.drawn_traces import FAMILIES, Design, draw_traces, model_of_traces, traces_of
 from tests.oracles.peers import Measured
+from tests.oracles.swim_peers import linear_fit
 
 
 def test_a_table_is_fitted_in_the_logarithms_of_its_ratios() -> None:
@@ -54,6 +55,21 @@ def test_effects_are_added_as_long_as_their_f_test_is_significant(
 ) -> None:
     fits = {some: SimpleNamespace(chisqr=c, ndata=90, nvarys=1 + len(some)) for some, c in chisqr.items()}
     assert peers.forwards(fits) == named
+
+
+def test_a_linear_fit_has_the_numbers_of_lmfit() -> None:
+    lmfit = pytest.importorskip("lmfit", reason="lmfit is not installed (extra peers)")
+    rng = np.random.default_rng(3)
+    columns = np.column_stack([np.ones(40), 1e4 * rng.normal(size=40)])
+    y = columns @ [2.0, 3e-5] + 0.1 * rng.normal(size=40)
+    parameters = lmfit.Parameters()
+    parameters.add_many(("a", 0.0), ("b", 0.0))
+    theirs = lmfit.minimize(lambda p: y - columns @ [p["a"].value, p["b"].value], parameters)
+    own = linear_fit(columns, y)
+    for name in ("chisqr", "ndata", "nvarys", "aic", "bic"):
+        assert getattr(own, name) == pytest.approx(getattr(theirs, name), rel=1e-6), name
+    assert own.sizes == pytest.approx([theirs.params[n].value for n in "ab"], rel=1e-4)
+    assert own.errors == pytest.approx([theirs.params[n].stderr for n in "ab"], rel=1e-3)
 
 
 def test_other_methods_find_a_large_effect() -> None:

@@ -13,7 +13,7 @@ import pytest
 
 from common.errors import InputError
 from dataset import build as engine
-from dataset.build import UnfinishedError, build, cut, mend, missing
+from dataset.build import UnfinishedError, build, chunk_rows, cut, mend, missing
 from dataset.data_set import SWEEP, read
 from dataset.design import Axis
 from dataset.schema import rows_version
@@ -58,6 +58,13 @@ def test_rows_that_are_missing_are_cut_on_a_grid() -> None:
     assert missing(parts, 100) == [(20, 30), (40, 95)]
     assert missing(parts, 120) == [(20, 30), (40, 95), (110, 120)]
     assert list(cut([(20, 30), (40, 95)], 25)) == [(20, 25), (25, 30), (40, 50), (50, 75), (75, 95)]
+
+
+def test_chunks_are_shares_of_the_workers_and_few_where_rows_are_many() -> None:
+    assert chunk_rows(100, 100, 5) == 5
+    assert chunk_rows(10**5, 10**5, 2) == 1024
+    assert chunk_rows(10**7, 10**7, 1000) == 2442
+    assert chunk_rows(10**7, 2000, 1000) == 1  # rows that are mended
 
 
 def test_a_finished_build_is_left_alone_and_another_configuration_is_not_mixed_in(tmp_path: Path) -> None:
