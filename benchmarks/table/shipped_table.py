@@ -61,6 +61,7 @@ from surrogate.training.train import (
 )
 
 TAILS = Settings(width=64, depth=3, members=1, epochs=60, iterations=6000)
+FEW = replace(TAILS, iterations=12000)  # of one and two tails
 CURVES = Settings(width=64, depth=2, members=1, epochs=60, iterations=1500)
 ROWS = {
     "tails": (98304, 101), "single": (16384, 505), "couples": (8192, 606),
@@ -237,7 +238,7 @@ def main(*words: str) -> None:
         if arguments.response:
             lookup = with_tails(
                 load(arguments.response), steady, widths, held_out, TAILS,
-                source={"seeds": ROWS}, context=context,
+                few_settings=FEW, source={"seeds": ROWS}, context=context,
             )  # fmt: skip
         else:
             flips = kept(arguments.work, "flips")
@@ -245,7 +246,7 @@ def main(*words: str) -> None:
             learned, swept_held_out = swept(arguments.sweep)
             lookup = learn(
                 steady, widths, held_out, join_robots([flips, learned]), TAILS, CURVES,
-                source=source, flips_held_out=swept_held_out, context=context,
+                few_settings=FEW, source=source, flips_held_out=swept_held_out, context=context,
             )  # fmt: skip
         lookup = with_response_errors(lookup, title="errors of the response")
         lookup = with_intervals_of_users(lookup, arguments.work)

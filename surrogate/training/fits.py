@@ -83,19 +83,23 @@ def learnable(rows: WrenchSamples) -> Flags:
     return (spin > 0) & to_its_side & (np.abs(yaw) < TURNS * spin)
 
 
-def fit_wrench(rows: WrenchSamples, settings: Settings, context: TrainingContext) -> WrenchTable:
+def fit_wrench(
+    rows: WrenchSamples, settings: Settings, context: TrainingContext, *, few_settings: Settings | None = None
+) -> WrenchTable:
     """Fit the networks of all CLASSES, and that of the gap, to samples that are `learnable`.
 
     Args:
         rows: the samples.
         settings: of the networks.
         context: device, progress bars, and where states are kept.
+        few_settings: of the networks of robots with one and two tails, which are harder; by default `settings`.
     """
     networks: list[Ensemble | None] = []
     for k, count in enumerate(CLASSES):
         samples = rows.at(network_index(rows.robots.number) == k)
         part = context.part(f"tails of N = {count}{' and more' if count == CLASSES[-1] else ''}")
-        networks.append(_fit_class(samples, settings, part, k) if len(samples.motion) else None)
+        own = few_settings if few_settings and count <= 2 else settings
+        networks.append(_fit_class(samples, own, part, k) if len(samples.motion) else None)
     gap = _fit_gap(rows.at(rows.robots.number > 1), _GAP, context.part("gap"))
     return WrenchTable(tuple(networks), gap)
 

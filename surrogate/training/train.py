@@ -125,6 +125,7 @@ def learn(
     settings: Settings | None = None,
     curve_settings: Settings | None = None,
     *,
+    few_settings: Settings | None = None,
     flips_held_out: SimulatedRobots | None = None,
     source: dict[str, Any] | None = None,
     context: TrainingContext = _QUIET,
@@ -136,6 +137,7 @@ def learn(
         width_rows: robots for the local widths of the intervals.
         held_out: robots for the errors and the factor of the intervals.
         flipped: robots with response curves.
+        few_settings: of the networks of robots with one and two tails; by default `settings`.
         flips_held_out: robots with curves for the errors of the response; by default a tenth of `flipped`.
         source: more provenance.
         context: device, progress bars, and where states are kept.
@@ -147,7 +149,7 @@ def learn(
     rows, _ = _learnable(learned)
     classes = len(np.unique(network_index(rows.robots.number)))
     context = replace(context, networks=classes + 1 + len(PARTS))  # one of the gap, and those of the response
-    table = fit_wrench(rows, wrench_settings, context)
+    table = fit_wrench(rows, wrench_settings, context, few_settings=few_settings)
     flipped, flips_held_out = _several_tails(flipped), _several_tails(flips_held_out)
     flips, usable = _learnable(flipped)
     response = fit_response(flips, flipped.at(usable).curves, response_settings, context.part("flips"))
@@ -157,8 +159,7 @@ def learn(
         "held_out": len(held_out),
         "flips": len(flips.motion),
     }
-    of_response = asdict(response_settings)
-    created = provenance({"tails": asdict(wrench_settings), "curves": of_response, "device": context.device})
+    created = _created(wrench_settings, few_settings, asdict(response_settings), context)
     lookup = NeuralTable(
         tails=table,
         curves=response,
@@ -178,6 +179,7 @@ def with_tails(
     held_out: SimulatedRobots,
     settings: Settings,
     *,
+    few_settings: Settings | None = None,
     source: dict[str, Any] | None = None,
     context: TrainingContext = _QUIET,
 ) -> NeuralTable:
@@ -185,13 +187,12 @@ def with_tails(
 
     Args:
         lookup: the table that gives the response and its errors.
-        learned, width_rows, held_out, settings, source, context: as for `learn`.
+        learned, width_rows, held_out, settings, few_settings, source, context: as for `learn`.
     """
     rows, _ = _learnable(learned)
-    tails = fit_wrench(rows, settings, context)
+    tails = fit_wrench(rows, settings, context, few_settings=few_settings)
     counts = {"train": len(rows.motion), "widths": len(width_rows), "held_out": len(held_out)}
-    of_response = lookup.provenance["config"]["curves"]
-    created = provenance({"tails": asdict(settings), "curves": of_response, "device": context.device})
+    created = _created(settings, few_settings, lookup.provenance["config"]["curves"], context)
     learned_first = {name: lookup.provenance[name] for name in _OF_RESPONSE if name in lookup.provenance}
     again = replace(
         lookup,
@@ -206,6 +207,14 @@ def with_tails(
         },
     )
     return _with_intervals(again, width_rows, held_out)
+
+
+def _created(
+    tails: Settings, few: Settings | None, curves: dict[str, Any], context: TrainingContext
+) -> dict[str, Any]:
+    """Return the provenance of a table that is trained with these settings."""
+    of_tails = {"tails": asdict(tails), "few": asdict(few or tails)}
+    return provenance({**of_tails, "curves": curves, "device": context.device})
 
 
 def _supports(rows: WrenchSamples) -> tuple[Support | None, ...]:
