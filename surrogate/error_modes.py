@@ -39,7 +39,7 @@ CURVE_ERRORS = "curve_errors"  # the entry of a model file; files of earlier ver
 KINDS = ("lag", "memory")
 NORMAL_90 = 1.6449  # half of an interval that holds 90 % of a normal distribution, in standard deviations
 _OUTLIER = 2.5
-_KEPT_OF_LEARNED = 0.99
+_KEPT_OF_LEARNED = 0.985  # of the variance
 
 
 def error_modes(

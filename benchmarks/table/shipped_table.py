@@ -4,7 +4,7 @@ Usage: python -m benchmarks shipped_table WORK --response TABLE --out MODEL    k
        softflagella sweep --config surrogate/shipped/domain.toml --out SWEEP
        python -m benchmarks shipped_table WORK --sweep SWEEP --out MODEL    the response is learned, too
        python -m benchmarks shipped_table WORK --calibrate MODEL [--out MODEL]    its intervals alone, anew
-       python -m benchmarks shipped_table WORK --test MODEL [--card CARD]
+       python -m benchmarks shipped_table WORK --test MODEL [--card CARD] [--picture PNG]
 
 Sets that are simulated are kept in WORK. --test prints errors on robots of the test set; `python -m benchmarks
 lookup` the coverage of the intervals. The shipped file was made by the first command, with the response that an
@@ -155,8 +155,11 @@ def test(lookup: NeuralTable, rows: SimulatedRobots, flips: SimulatedRobots) -> 
           f"{np.count_nonzero(~inside)}")  # fmt: skip
     errors = {name: error[inside] for name, error in relative_errors(answer, truth).items()}
     errors["v_z of itself"] = (answer["v_z"] / truth["v_z"] - 1)[inside]
-    several = rows.robots["N"][inside] > 1
-    for words, kind in (("all", several | True), ("two tails and more", several), ("one tail", ~several)):
+    tails = rows.robots["N"][inside]
+    for words, kind in (
+        ("all", tails > 0), ("two tails and more", tails > 1), ("three and more", tails > 2),
+        ("two tails", tails == 2), ("one tail", tails == 1),
+    ):  # fmt: skip
         print(words)
         for name, figures in summary({n: e[kind] for n, e in errors.items()}, apart[inside][kind]).items():
             print(f"  {name:16}" + "".join(f"  {k} {100 * v:.4f}" for k, v in figures.items()))
@@ -168,6 +171,25 @@ def test(lookup: NeuralTable, rows: SimulatedRobots, flips: SimulatedRobots) -> 
     valid = flips.motion["tail_gap"] >= 1
     for name, figures in summary({n: e[known] for n, e in report.items()}, valid[known]).items():
         print(f"  {name:16}" + "".join(f"  {k} {100 * v:.3f}" for k, v in figures.items()))
+
+
+def draw(lookup: NeuralTable, rows: SimulatedRobots, picture: str) -> None:
+    """Draw the errors of the yaw rate against the motor speed; robots in the domain, tails that do not touch."""
+    from matplotlib.figure import Figure
+
+    answer = lookup.query(rows.robots, flag=True)
+    known = ~answer["outside"] & (rows.motion["tail_gap"] >= 1)
+    error = 100 * np.abs(relative_errors(answer, with_radius(rows.motion))["omega_yr_bar"])
+    tails, figure = rows.robots["N"], Figure(figsize=(7.5, 4.2), layout="constrained")
+    axes = figure.add_subplot()
+    for words, kind in (("three and more", tails > 2), ("two", tails == 2), ("one tail", tails == 1)):
+        some = known & kind
+        axes.loglog(rows.robots["omega_bar"][some], error[some], ".", markersize=3, alpha=0.7, label=words)
+    axes.set_ylim(1e-4, 3)
+    axes.set_xlabel("motor speed ω̄")
+    axes.set_ylabel("error of the yaw rate [%]")
+    axes.legend(frameon=False, markerscale=4, reverse=True)
+    figure.savefig(picture, dpi=100)
 
 
 def inside(lookup: NeuralTable, rows: SimulatedRobots) -> SimulatedRobots:
@@ -225,6 +247,7 @@ def main(*words: str) -> None:
     parser.add_argument("--response", help="table whose response to a flip is kept, instead of a sweep")
     parser.add_argument("--calibrate", help="table whose intervals alone are learned anew")
     parser.add_argument("--test")
+    parser.add_argument("--picture", help="with --test: draw the errors of the yaw rate of its robots")
     parser.add_argument("--card", help="with --test: write the card, from held-out and fresh robots of the domain")
     arguments = parser.parse_args(words)
     if arguments.calibrate:
@@ -256,6 +279,8 @@ def main(*words: str) -> None:
     if arguments.test:
         lookup, locked = load(arguments.test), kept(arguments.work, "locked")
         test(lookup, locked, kept(arguments.work, "locked_flips"))
+        if arguments.picture:
+            draw(lookup, locked, arguments.picture)
     if arguments.card:
         lookup = load(arguments.test)
         fresh = inside(lookup, kept(arguments.work, "fresh"))

@@ -11,7 +11,7 @@ import { BEFORE_KNOTS, COUNT, SHORTEST, STEP, lagAt, lagNoise, lagPlace, pivotRa
 import { zigzagSpeed } from "./vehicle.js";
 
 const { WEYL, FIRST, SECOND, MIDDLE, TAIL } = CONSTANTS.stated_error;
-const { LEVEL, WOBBLE, DRAWS, BLOCKS, OF_PHASE } = CONSTANTS.stated_error;
+const { LEVEL, WOBBLE, DRAWS, BLOCKS } = CONSTANTS.stated_error;
 const { TIGHTEST, PAIRS_AHEAD } = CONSTANTS.line_of_sight;
 const { WITHIN, KEPT, ZIGZAG, PLACE, COURSE, STRETCH, CAMERA } = CONSTANTS.stated_error;
 const NOTHING = [0, 0, 0];
@@ -142,8 +142,7 @@ function flipsBetween(count) {
 /* The quantile LEVEL of the largest distance from the declared path over random vehicles. growth: at the flips. */
 function statedError(growth, flips, predicted, seed = 0) {
   const { low, high, normal } = extremes(predicted, flips), blocks = low.length, last = blocks - 1, wide = blocks + 1;
-  const count = growth.length, z = normals(seed, DRAWS * count + 3).slice();
-  const across = new Float64Array((count + 3) * wide);
+  const count = growth.length, z = normals(seed, DRAWS * count + 3), across = new Float64Array((count + 3) * wide);
   growth.forEach(({ x, y }, p) => { // across the path at the end of each block, and along it at its end
     normal.forEach(([aside, ahead], block) => (across[p * wide + block] = x[block + 1] * aside + y[block + 1] * ahead));
     across[p * wide + blocks] = x[blocks] * normal[last][1] - y[blocks] * normal[last][0];
@@ -152,11 +151,6 @@ function statedError(growth, flips, predicted, seed = 0) {
   for (let draw = 0; draw < DRAWS; draw++) {
     let off = 0, most = 0;
     moved.fill(0);
-    for (let i = (draw + 1) * count - OF_PHASE; i < (draw + 1) * count; i += 2) { // waves of known height
-      const length = Math.hypot(z[i], z[i + 1]) / Math.SQRT2;
-      z[i] /= length;
-      z[i + 1] /= length;
-    }
     for (let p = 0; p < count; p += 4) { // four at a time, which is faster; what is beyond the last is 0
       const [a, b, c, d] = z.subarray(draw * count + p), ofB = wide, ofC = 2 * wide, ofD = 3 * wide;
       for (let block = 0, at = p * wide; block < wide; block++, at++) {

@@ -10,9 +10,9 @@ the disc is added.
 
 The lag after a flip varies with the phase φ of the disc at that flip: N waves in a turn, with the standard
 deviation `Vehicle.spread`. The motor's speed tells how far the disc turns from flip to flip, so only the first
-phase is unknown, and where in the wave it lies. The lags of each direction thus vary as A cos Nφ + B sin Nφ, where
-(A, B) is √2 long and points anywhere: two modes for each direction. Where φ comes back at every second flip, as
-with equal dwells, these errors add up; elsewhere they average out.
+phase is unknown, and where in the wave it lies. The lags of each direction thus vary as A cos Nφ + B sin Nφ, with
+independent A and B of mean 0 and variance 1: two modes for each direction. Where φ comes back at every second
+flip, as with equal dwells, these errors add up; elsewhere they average out.
 
 *Stated error with feedback*, of what `tracking.tracker` does with the poses of a camera: the robot is
 within it in 95 % of the time, from the start of the path. The zigzag is uniform between ±A, where 0.95 A is the
@@ -56,7 +56,6 @@ LEVEL = 0.95
 WOBBLE = 0.002  # l; what the disc's revolutions move the body, which the vehicle averages
 _DRAWS = 400
 _LAP_DRAWS = 1000
-_OF_PHASE = 4  # modes
 _BLOCKS = 300  # places along the schedule where deviations are drawn
 WITHIN = (1.96, 1.645)  # standard deviations on both sides that hold 95 % of a normal and of a uniform variable
 BELOW = (1.645, 1.559)  # the same for the upper side alone
@@ -315,18 +314,9 @@ def stated_error(growth: ErrorGrowth, predicted: Predicted, *, seed: int = 0) ->
 def deviations_open_loop(growth: ErrorGrowth, seed: int = 0) -> Floats:
     """Draw deviations of the place (D, E − 1, 2) at the ends of the blocks."""
     blocks, modes, _ = growth.deviation[1:].shape
-    z = _drawn(seed, _DRAWS, modes)
+    z = normals(seed, 0, _DRAWS * modes).reshape(_DRAWS, modes)
     flat = np.moveaxis(growth.deviation[1:], 1, 0).reshape(modes, 2 * blocks)
     return np.asarray((z @ flat).reshape(_DRAWS, blocks, 2))
-
-
-def _drawn(seed: int, count: int, modes: int) -> Floats:
-    """Draw sizes of modes (D, P): normal ones, and, for the disc's phase at the end, waves of known height."""
-    sizes = normals(seed, 0, count * modes).reshape(count, modes).copy()
-    waves = sizes[:, -_OF_PHASE:].reshape(count, -1, 2)
-    waves = math.sqrt(2) * waves / np.linalg.norm(waves, axis=2, keepdims=True)
-    sizes[:, -_OF_PHASE:] = waves.reshape(count, -1)
-    return sizes
 
 
 def _extremes(predicted: Predicted, edges: Integers, samples: int) -> tuple[Floats, Floats, Floats]:
@@ -388,7 +378,7 @@ def drift_of_a_lap(tracked: TrackedVehicle, switches: Switches, seed: int) -> tu
     rollout = roll_out(tracked.vehicle, switches, tracked.offset)
     growth = error_growth(tracked.vehicle, switches, rollout)
     modes = growth.deviation.shape[1]
-    drawn = _drawn(seed, _LAP_DRAWS, modes)
+    drawn = normals(seed, 0, _LAP_DRAWS * modes).reshape(_LAP_DRAWS, modes)
     moved, turned = drawn @ growth.deviation[-1], drawn @ growth.turned[-1]
     return float(np.quantile(np.hypot(*moved.T), LEVEL)), float(np.quantile(np.abs(turned), LEVEL))
 

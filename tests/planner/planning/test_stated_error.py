@@ -97,21 +97,10 @@ def test_without_uncertainty_it_is_the_predicted_error_and_the_motion_within_a_r
 def test_a_robot_that_swims_past_an_open_end_is_off_its_path(closed: bool, expected: float) -> None:
     """One mode, a way along the path that is too long or too short: half of the robots stop before the end."""
     x = np.arange(3.0)
-    along = np.zeros((3, 5, 2))  # those of the disc's phase are 0
-    along[:, 0, 0] = 0.1 * x
-    growth = ErrorGrowth(np.arange(3), along, np.zeros((3, 5)))
+    along = np.stack([0.1 * x, 0 * x], 1)[:, None]
+    growth = ErrorGrowth(np.arange(3), along, np.zeros((3, 1)))
     predicted = Predicted(np.zeros(3), np.zeros(3), np.tile([0.0, 1.0], (3, 1)), closed)
     assert stated_error(growth, predicted) == pytest.approx(expected * 0.2, rel=0.15, abs=0.01)
-
-
-def test_the_phase_of_the_disc_changes_a_lag_by_no_more_than_a_wave() -> None:
-    """Of √2 cos φ with a random φ, 95 % are below √2 cos(0.025 π); of a normal variable, below 1.96."""
-    across = np.zeros((2, 4, 2))
-    across[1, 0, 1] = 0.1
-    growth = ErrorGrowth(np.arange(2), across, np.zeros((2, 4)))
-    still = Predicted(np.zeros(2), np.zeros(2), np.tile([0.0, 1.0], (2, 1)), True)
-    expected = 0.1 * np.sqrt(2) * np.cos(0.025 * np.pi) + WOBBLE
-    assert stated_error(growth, still) == pytest.approx(expected, rel=0.005)
 
 
 def test_phases_that_differ_average_out() -> None:
