@@ -213,8 +213,8 @@ def main(tables: str = "40", first: str = "0", picture: str = "", folder: str = 
     for place, case in enumerate(CASES):
         of_case = [worth for at, worth in done if at == place]
         nothing, outside = "nothing" in case.label, "not in" in case.label
-        for method in of_case[0]:
-            each = [worth[method] for worth in of_case]
+        for method in dict.fromkeys(method for worth in of_case for method in worth):
+            each = [worth[method] for worth in of_case if method in worth]
             held = [hit for worth in each for hit in worth["held"]]
             cells = [per_cent(sum(worth[key] for worth in each), len(each)) for key in ("named", "right", "alone")]
             print(row(case.label, method, cells[0], *(("", "") if nothing or outside else cells[1:]),

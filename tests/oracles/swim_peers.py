@@ -25,6 +25,7 @@ from calibration.swim.swim_model import SwimModel, both_directions
 from calibration.swim.swim_runs import runs_of_swims
 from calibration.swimmer.swimmer import SwimmerModel
 from common.arrays import Floats
+from common.errors import InputError
 from sim.knowledge import COEFFICIENTS
 from tests.oracles.drawn_swims import LabSwim
 from tests.oracles.peers import TAIL, Finding, by_criteria, sets_of
@@ -101,8 +102,14 @@ def _in_range(effects: Mapping[str, Parameter], some: tuple[str, ...], of: Linea
 
 
 def _intervals(model: SwimModel, at: Mapping[str, float], names: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Fit again with some effects, and compute 95 % intervals of the coefficients, which are logarithms."""
-    again = _fitted(model, at, names)
-    errors = linear_fit(*_near(model, again, names)).errors
+    """Fit again with some effects, and compute 95 % intervals of the coefficients, which are logarithms.
+
+    There are none where the fit leads to robots that cannot be simulated.
+    """
+    try:
+        again = _fitted(model, at, names)
+        errors = linear_fit(*_near(model, again, names)).errors
+    except (InputError, ValueError):  # of the simulator; of SciPy, for what is not finite
+        return {}
     each = {name: TAIL * float(errors[names.index(name)]) for name in COEFFICIENTS}
     return {name: (again[name] * math.exp(-e), again[name] * math.exp(e)) for name, e in each.items()}
