@@ -117,13 +117,33 @@ class SwimModel:
     def linearised(
         self, at: Parameters, along: Sequence[Parameter], *, title: str = "", quick: bool = False
     ) -> Predict:
-        """Return the linear model, by differences; NaN if `quick` where a robot cannot be simulated."""
+        """Return the linear model, by differences; NaN along effects with which a robot cannot be simulated.
+
+        If `quick`, it is NaN altogether then.
+        """
+        near = replace(self, around=True)
         try:
-            return central(replace(self, around=True), at, along, title=title)
+            return central(near, at, along, title=title)
         except InputError:
-            if not quick:
-                raise
-        return lambda sets: np.full((len(sets), *self.runs.y.shape), np.nan)
+            if quick:
+                return lambda sets: np.full((len(sets), *self.runs.y.shape), np.nan)
+        effects = {effect.name for effect in self.effects}
+        lacking = [p for p in along if p.name in effects and not near.can_change(at, p)]
+        known = central(near, at, [p for p in along if p not in lacking], title=title)
+
+        def predict(sets: Sequence[Parameters]) -> Floats:
+            changed = [any(one[p.name] != at[p.name] for p in lacking) for one in sets]
+            return np.where(np.reshape(changed, (-1, 1, 1)), np.nan, known(sets))
+
+        return predict
+
+    def can_change(self, at: Parameters, p: Parameter) -> bool:
+        """Tell whether robots on both sides of one along a parameter can be simulated."""
+        try:
+            central(self, at, [p])
+        except InputError:
+            return False
+        return True
 
     def swimming(self, sets: Sequence[Parameters]) -> list[Swimming]:
         """Make the robots of P parameter sets."""

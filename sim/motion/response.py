@@ -109,7 +109,9 @@ def responses(
     if not history:
         memory[:], rest[:] = np.nan, np.nan
     speed = net_speeds(twist, lag, memory, before, dwells)
-    failed = ~np.isfinite(speed[:, -1])
+    simulated = (lag, memory, rest) if history else (lag,)
+    finite = [np.isfinite(part).reshape(len(part), -1).all(1) for part in simulated]
+    failed = ~(np.all(finite, axis=0) & np.isfinite(speed[:, -1]))
     for array in (lag, memory, rest, spread, speed):
         array[failed] = np.nan
     return Responses(lag, memory, rest, spread, speed, failed, stepped, before)

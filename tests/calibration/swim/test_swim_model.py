@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -175,6 +176,32 @@ def test_a_fit_turns_back_where_a_robot_cannot_be_simulated(monkeypatch: pytest.
     assert np.isnan(slopes).all()
     with pytest.raises(InputError, match="broke down"):
         derivatives(model, start, ["C_t"])
+
+
+@pytest.mark.slow
+def test_an_effect_with_which_no_robot_can_be_simulated_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A verdict ended with an error because of one effect of twenty-six."""
+    (swim,) = read_swims(make_track(CONTROL, plan_of(CONTROL), seed=0), plan_of(CONTROL))
+    model, _ = swim_model(CONTROL, [swim])
+    simulated = Vehicles._simulated
+
+    def broken(self: Vehicles, wanted: Any) -> Any:
+        if any(name == "disc_drag" for robot, _ in wanted for name, _ in robot):
+            raise InputError("broke down")
+        return simulated(self, wanted)
+
+    monkeypatch.setattr(Vehicles, "_simulated", broken)
+    names, start = ["C_t", "disc_drag", "left_right_bias"], start_values(model)
+    seen, slopes = derivatives(model, start, names)
+    assert np.isfinite(seen).all()
+    assert np.isnan(slopes[..., 1]).all()
+    assert np.isfinite(slopes[..., [0, 2]]).all()
+    found = directions(model, start, [p for p in model.effects if p.name in names])
+    assert [bool(found.table[..., place].any()) for place in range(2)] == [
+        p.name != "disc_drag" for p in model.effects if p.name in names
+    ]
+    with pytest.raises(InputError, match="broke down"):
+        derivatives(model, {**start, "disc_drag": 1.0}, names)
 
 
 @cache

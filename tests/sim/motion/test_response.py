@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -132,6 +134,20 @@ def test_a_robot_that_breaks_down_is_flagged_and_the_others_go_on() -> None:
     assert found.failed.tolist() == [False, True]
     assert np.isnan(found.lag[1]).all()
     assert np.isfinite(found.lag[0]).all()
+
+
+def test_a_robot_whose_memory_alone_breaks_down_is_flagged(monkeypatch: pytest.MonkeyPatch) -> None:
+    extrapolated = response._extrapolated
+
+    def broken(*given: Any) -> Any:
+        curves = extrapolated(*given)
+        return curves._replace(memory=np.where(np.arange(len(DWELLS))[:, None] == 3, np.nan, curves.memory))
+
+    monkeypatch.setattr(response, "_extrapolated", broken)
+    found = responses(control())
+    assert found.failed.all()
+    assert np.isnan(found.lag).all()
+    assert not responses(control(), history=False).failed.any()
 
 
 def test_a_replay_turns_at_the_rate_of_each_direction() -> None:
