@@ -1,7 +1,8 @@
-"""Processor time and memory of long tables of time series: cups that cool, eight numbers, five effects.
+"""Processor time and memory of long tables: cups that cool, eight numbers, five effects, and balls that fall.
 
 Half of the traces repeat the others. Each has a start of its own; seven numbers are shared. The noise forgets in
-240 s, of an hour. A lag of 30 s is planted, or nothing.
+240 s, of an hour. A lag of 30 s is planted, or nothing. The balls are nine, in ten rounds that scatter, with three
+effects.
 
 Usage: python -m benchmarks many_readings [READINGS] [TRACES]
 
@@ -21,7 +22,9 @@ from scipy.signal import lfilter
 
 import softflagella as sf
 from benchmarks.common import heading, row
+from tests.oracles.drawn_falls import DIAMETERS, declared, falls
 
+_ROUNDS = 10
 _HOUR, _FORGETS = 3600.0, 240.0  # s
 _TRUTH = {"rate": 1 / 900, "power": 0.3, "room": 0.2, "slope": 1.0, "swing": 0.1, "of_mass": 0.3, "late": 5.0}
 _NULLS = dict.fromkeys(("radiation", "lag", "fill", "drift", "bend"), 0.0)
@@ -72,12 +75,19 @@ def readings(count: int, traces: int, planted: Mapping[str, float]) -> pd.DataFr
 
 
 def main(count: str = "100000", traces: str = "50") -> None:
-    print(heading("planted", "readings", "verdict", "processor time", "memory of the process"))
-    cases: tuple[dict[str, float], ...] = ({}, {"lag": 30.0})
-    for planted in cases:
-        table = readings(int(count), int(traces), planted)
-        began = time.process_time()
-        verdict = sf.calibrate(table, MODEL, trace="cup", progress=False)
-        seconds, peak = time.process_time() - began, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-        said = f"{verdict.verdict} {' '.join(verdict.effects)}".strip()
-        print(row(", ".join(planted) or "nothing", len(table), said, f"{seconds:.0f} s", f"{peak:.1f} GB"))
+    print(heading("table", "planted", "rows", "verdict", "processor time", "memory of the process"))
+    for planted in ({}, {"lag": 30.0}):
+        told("cups", readings(int(count), int(traces), planted), MODEL, planted, trace="cup")
+    repeats = max(int(count) // (_ROUNDS * len(DIAMETERS)), 1)
+    for planted in ({}, {"wall": 0.2}):
+        table = falls(0, rounds=_ROUNDS, repeats=repeats, scatter=0.01, **planted)
+        told("balls", table, declared(), planted, session="round")
+
+
+def told(name: str, table: pd.DataFrame, model: sf.Model, planted: Mapping[str, float], **roles: str) -> None:
+    """Calibrate with a table, and print what that took."""
+    began = time.process_time()
+    verdict: Any = sf.calibrate(table, model, progress=False, **roles)  # type: ignore[arg-type]
+    seconds, peak = time.process_time() - began, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    said = f"{verdict.verdict} {' '.join(verdict.effects)}".strip()
+    print(row(name, ", ".join(planted) or "nothing", len(table), said, f"{seconds:.0f} s", f"{peak:.1f} GB"))
