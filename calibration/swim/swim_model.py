@@ -128,7 +128,7 @@ class SwimModel:
             if quick:
                 return lambda sets: np.full((len(sets), *self.runs.y.shape), np.nan)
         effects = {effect.name for effect in self.effects}
-        lacking = [p for p in along if p.name in effects and not near.can_change(at, p)]
+        lacking = [p for p in along if p.name in effects and not near._can_change(at, p)]
         known = central(near, at, [p for p in along if p not in lacking], title=title)
 
         def predict(sets: Sequence[Parameters]) -> Floats:
@@ -137,7 +137,7 @@ class SwimModel:
 
         return predict
 
-    def can_change(self, at: Parameters, p: Parameter) -> bool:
+    def _can_change(self, at: Parameters, p: Parameter) -> bool:
         """Tell whether robots on both sides of one along a parameter can be simulated."""
         try:
             central(self, at, [p])

@@ -37,12 +37,8 @@ class SymmetricMatrix:
 
     def __init__(self, count: int, size: float, like: Tensor):
         height = _STRIP if like.device.type == "cpu" else count
-        self.strips = [
-            torch.zeros(
-                min(height, count - first), min(first + height, count), dtype=like.dtype, device=like.device
-            )
-            for first in range(0, count, height)
-        ]
+        ends = [(first, min(first + height, count)) for first in range(0, count, height)]
+        self.strips = [like.new_zeros(last - first, last) for first, last in ends]
         for strip in self.strips:
             strip.diagonal(strip.shape[1] - len(strip)).fill_(size)
         self._waiting: tuple[float, Tensor, Tensor] | None = None

@@ -88,6 +88,23 @@ def test_a_single_tail_is_learned_beside_several() -> None:
     assert 0.75 < np.mean(((low <= wanted) & (wanted <= high))[inside]) < 0.99
 
 
+def test_tails_are_learned_anew_beside_the_response_of_a_table() -> None:
+    several, held = rows(256, 13, wide=False), rows(96, 14, wide=False)
+    first = training.learn(several, held, held, flips(), TAILS, CURVES)
+    fewer = several.at(np.arange(len(several)) % 2 == 0)
+    again = training.with_tails(first, fewer, held, held, TAILS, source={"seeds": 13})
+    assert again.curves is first.curves
+    assert again.provenance["rows"]["flips"] == first.provenance["rows"]["flips"]
+    assert again.provenance["rows"]["train"] < first.provenance["rows"]["train"]
+    assert again.provenance["response"]["code_version"] == first.provenance["code_version"]
+    third = training.with_tails(again, several, held, held, TAILS)
+    assert third.provenance["response"] == again.provenance["response"]
+    robots = rows(32, 15, wide=False).robots
+    answers = [table.query(robots, flag=True)["omega_yr_bar"] for table in (first, again, third)]
+    assert answers[2].tolist() == answers[0].tolist()
+    assert answers[1].tolist() != answers[0].tolist()
+
+
 def test_the_split_is_fixed_and_disjoint() -> None:
     parts = training.split(np.arange(10_000))
     assert np.array_equal(parts[:500], training.split(np.arange(500)))
