@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -29,6 +30,7 @@ from calibration.statistics.fit import Fit, UnsolvedError, fit
 from calibration.statistics.residual_tests import Directions, Misfit, directions, examine_residual
 from calibration.statistics.statistical_model import ForwardModel, Parameter, Parameters, start_values
 from calibration.statistics.study import Study
+from common.errors import InputError
 from common.progress import progress_bar
 
 FIRST = 3  # number of single effects to which a second one is added
@@ -149,13 +151,15 @@ def examine(
 def _cost(study: Study, near: Fit, candidate: Hypothesis) -> float:
     """Measure the processor time of a prediction with an effect [s]; all effects need about as many of them.
 
-    It is the least of some, since on a busy machine a function of one's own seems to wait.
+    It is the least of some, since on a busy machine a function of one's own seems to wait. A robot that cannot be
+    simulated costs what it took to notice.
     """
     size, (low, high) = candidate.evidence.expected or candidate.effect.typical, candidate.effect.bounds
     least = math.inf
     for share in _NOT_YET:
         began = clock()
-        study.model.predict([{**near.parameters, candidate.effect.name: min(max(share * size, low), high)}])
+        with suppress(InputError):
+            study.model.predict([{**near.parameters, candidate.effect.name: min(max(share * size, low), high)}])
         least = min(least, clock() - began)
     return least + _SHORTEST
 
