@@ -3,8 +3,8 @@
 Least squares with every effect and pair of the catalogue (lmfit), of which one is chosen by BIC, by AICc, or by
 F-tests, forwards, with a level of 1 % in all (Bonferroni); without a level for each session, and with one. A mixed
 model (statsmodels), linear near the fit without effects, with a random level for each session, by BIC. On cups
-that cool pysindy, with rates of cooling up to the cube of the excess. All of them fit all rows; the loop holds out
-a session.
+that cool pysindy, with rates of cooling up to the cube of the excess. On swims, a quarter as many, least squares
+with white noise of the poses. All of them fit all rows; the loop holds out a session, or the last third of a swim.
 
 Usage: python -m benchmarks peers [TABLES] [FIRST_SEED] [PICTURE.png] [FOLDER]
        TABLES: of each case. A method that is not installed (extra `peers`) is left out, and named.
