@@ -17,18 +17,15 @@ import pandas as pd
 from calibration.statistics.fit import fit
 from calibration.statistics.forward import derivatives
 from calibration.statistics.statistical_model import Parameter, start_values
-from calibration.swim.course import Vehicles
 from calibration.swim.measured_swim import read_swims
 from calibration.swim.pose_noise import Sizes
-from calibration.swim.sight import Sight
-from calibration.swim.swim_model import SwimModel, both_directions
-from calibration.swim.swim_runs import runs_of_swims
-from calibration.swimmer.swimmer import SwimmerModel
+from calibration.swim.swim_model import SwimModel
 from common.arrays import Floats
 from common.errors import InputError
 from sim.knowledge import COEFFICIENTS
 from tests.oracles.drawn_swims import LabSwim
 from tests.oracles.peers import TAIL, Finding, by_criteria, sets_of
+from tests.oracles.swim_scores import model_in_noise
 from tests.oracles.swims import CameraNoise
 
 _NONE = np.full(2, 1e-9)  # of a noise that nobody assumes: l, rad
@@ -65,12 +62,8 @@ def linear_fit(columns: Floats, y: Floats) -> LinearFit:
 
 def swim_by_least_squares(swim: LabSwim, track: pd.DataFrame) -> dict[str, Finding]:
     """Choose effects of a swim by each of the criteria."""
-    swims, length = read_swims(track, swim.plan), swim.given.tail_length
-    runs, _ = runs_of_swims(swims, length)
-    white = np.array(CameraNoise().white) / [length, 1.0]
-    runs = runs.in_noise(Sizes(white, _NONE, _NONE, 1.0), runs.poses)
-    inner = SwimmerModel(swim.given, both_directions(swim.given), 1)
-    model = SwimModel(inner, Sight(runs), runs, Vehicles.of(swims, swim.given.time_scale))
+    white = np.array(CameraNoise().white) / [swim.given.tail_length, 1.0]
+    model, _ = model_in_noise(swim.given, read_swims(track, swim.plan), Sizes(white, _NONE, _NONE, 1.0))
     free, effects = [p.name for p in model.coefficients], {p.name: p for p in model.effects}
     at = _fitted(model, start_values(model), free)
     columns, left = _near(model, at, [*free, *effects])

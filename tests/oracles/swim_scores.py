@@ -9,6 +9,7 @@ tails a robot whose coefficients are 7 % off can be 4.7 standard deviations from
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -17,18 +18,27 @@ import numpy as np
 from calibration.statistics.fit import beyond_its_ends, fit
 from calibration.statistics.statistical_model import start_values
 from calibration.swim.course import Vehicles
-from calibration.swim.measured_swim import read_swims
+from calibration.swim.measured_swim import MeasuredSwim, read_swims
 from calibration.swim.pose_noise import Sizes
 from calibration.swim.sight import Sight
 from calibration.swim.swim_model import SwimModel, both_directions
 from calibration.swim.swim_runs import runs_of_swims
 from calibration.swimmer.influences import SLIP, influences
 from calibration.swimmer.swimmer import SwimmerModel
+from common.arrays import Flags
 from sim.model.robot import Robot
 from tests.oracles.drawn_swims import LabSwim
 from tests.oracles.swims import CameraNoise, make_track
 
 _TYPICAL, _TRIES, _CLOSE = 0.2, 6, 0.08  # of an effect's typical size; of sizes; of λ
+
+
+def model_in_noise(robot: Robot, swims: Sequence[MeasuredSwim], sizes: Sizes) -> tuple[SwimModel, Flags]:
+    """Make the model of a robot's swims in a noise that is known; return the poses (n,) that are held out, too."""
+    runs, held_out = runs_of_swims(swims, robot.tail_length)
+    runs = runs.in_noise(sizes, runs.poses)
+    inner = SwimmerModel(robot, both_directions(robot), 1)
+    return SwimModel(inner, Sight(runs), runs, Vehicles.of(swims, robot.time_scale)), held_out
 
 
 class SwimScores:
@@ -38,13 +48,10 @@ class SwimScores:
         self.truth, camera = swim.truth, swim.disturbed["camera"]
         exact = CameraNoise(camera.every, (0.0, 0.0), (0.0, 0.0))
         swims = read_swims(make_track(self.truth, swim.plan, seed=0, camera=exact), swim.plan)
-        runs, held_out = runs_of_swims(swims, self.truth.tail_length)
         units, kick = np.array([self.truth.tail_length, 1.0]), swim.disturbed["kick"]
         white, slow, step = (np.array(each) / units for each in (camera.white, camera.slow, kick))
-        runs = runs.in_noise(Sizes(white, slow, step, camera.memory), runs.poses)
-        inner = SwimmerModel(self.truth, both_directions(self.truth), 1)
-        self.model = SwimModel(inner, Sight(runs), runs, Vehicles.of(swims, self.truth.time_scale))
-        self.used = ~runs.left_out(held_out)
+        self.model, held_out = model_in_noise(self.truth, swims, Sizes(white, slow, step, camera.memory))
+        self.used = ~self.model.runs.left_out(held_out)
 
     def strength(self, name: str, value: float, *, lowest: bool = True) -> float:
         """Compute λ of an effect of some value; of the `lowest` minimum, or of the first that a search finds."""
