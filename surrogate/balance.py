@@ -14,8 +14,10 @@ from common.arrays import Flags, Floats
 from sim.jit import compiled_fast
 from surrogate.network import BLOCK, Layers, evaluate
 from surrogate.tails import (
+    PAIR_INPUTS,
     PLACES,
     SINGLE_INPUTS,
+    inputs_of_pair,
     inputs_of_single,
     inputs_of_tail,
     linear_thrust,
@@ -29,26 +31,34 @@ DIFFERENCE, MIN_SHARE = 1e-6, 1e-3  # steps of finite differences, relative
 FIRST_SPIN = 0.6  # ω_t/ω in the first guess
 MAX_TURN = 0.5  # largest relative change of ω_t in one step
 _CHUNK = 1024  # robots whose states are in use at a time
-_SINGLE = len(SINGLE_INPUTS)
+_SINGLE, _PAIR = len(SINGLE_INPUTS), len(PAIR_INPUTS)
+
+
+@compiled_fast
+def _inputs(robot: Floats, motion: Floats) -> tuple[float, ...]:
+    """Return `surrogate.tails.INPUTS` of one robot."""
+    beta = np.arctan2(motion[0], motion[2])
+    perp, offset, radius = robot[PLACES.perp], robot[PLACES.offset], robot[PLACES.radius]
+    return inputs_of_tail(perp, offset, radius, robot[PLACES.number], robot[PLACES.spin_drag], motion, beta)
 
 
 @compiled_fast
 def inputs_at(robot: Floats, motion: Floats, x: Floats) -> None:
     """Write `surrogate.tails.INPUTS` of one robot to x (7,)."""
-    beta = np.arctan2(motion[0], motion[2])
-    perp, offset, radius = robot[PLACES.perp], robot[PLACES.offset], robot[PLACES.radius]
-    number, spin_drag = robot[PLACES.number], robot[PLACES.spin_drag]
-    for i, value in enumerate(inputs_of_tail(perp, offset, radius, number, spin_drag, motion, beta)):
+    for i, value in enumerate(_inputs(robot, motion)):
         x[i] = value
 
 
 @compiled_fast
 def network_inputs_at(robot: Floats, motion: Floats, x: Floats) -> None:
-    """Write the inputs of the network of one robot to x: SINGLE_INPUTS to x (13,), else INPUTS to x (7,)."""
+    """Write the inputs of the network of one robot to x: SINGLE_INPUTS (13,), PAIR_INPUTS (11,) or INPUTS (7,)."""
     if len(x) == _SINGLE:
         perp, offset, radius = robot[PLACES.perp], robot[PLACES.offset], robot[PLACES.radius]
         x[0], x[1], x[2], x[3] = inputs_of_single(perp, offset, radius, robot[PLACES.spin_drag], motion[4])
         x[4:] = robot[PLACES.head]
+    elif len(x) == _PAIR:
+        for i, value in enumerate(inputs_of_pair(_inputs(robot, motion), robot[PLACES.head])):
+            x[i] = value
     else:
         inputs_at(robot, motion, x)
 

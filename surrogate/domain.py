@@ -44,7 +44,7 @@ _REASONS = (
     "",
     "none with as many tails were learned",
     "its tails or its motor were not learned, or no motion was found",
-    "its tails move as none of the learned ones do",
+    "its tails, or with one or two of them its head, are unlike all learned ones",
     "it yaws nearly as fast as its tails turn, and may have several motions",
     "its head has no side force as it spins, and no flip of such a robot was learned",
 )

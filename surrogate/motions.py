@@ -17,10 +17,10 @@ from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.balance import inputs_at, network_inputs_at, solve
 from surrogate.domain import FAST_YAW, INSIDE, MAX_YAW_SHARE, NO_MOTION, NOVEL, SupportNumbers, put_novelty
 from surrogate.network import BLOCK, Ensemble, Layers, evaluate
-from surrogate.tails import INPUTS, PLACES, SINGLE_INPUTS
+from surrogate.tails import INPUTS, PAIR_INPUTS, PLACES, SINGLE_INPUTS
 
 CLASSES = (1, 2, 3)  # networks for N = 1, N = 2, and three or more tails
-INPUT_COUNTS = (len(SINGLE_INPUTS), len(INPUTS), len(INPUTS))  # of these networks
+INPUT_COUNTS = (len(SINGLE_INPUTS), len(PAIR_INPUTS), len(INPUTS))  # of these networks
 SPREAD, TINY_SPREAD = 8, 1e-9  # the spread of the members among what widths depend on, as a logarithm
 _INPUTS, _OUTPUTS = len(INPUTS), 12
 FEATURES = _INPUTS + 4  # that widths of intervals depend on

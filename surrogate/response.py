@@ -5,11 +5,12 @@ robot to robot:
 
     Δz/w, Δx/v_x, Δψ/ω_yr,   w² = v_z² + (v_x/10)²
 
-(w and not v_z, because v_z may vanish). Lag, memory, rest and the logarithm of the spread are each written in the
-principal components of the rows that were learned. Three networks give the components: one for the lag, one for
-memory and rest, which data sets hold for a part of their robots, and one for the spread. Robots with two tails
-have a spread; with more, the lag does not depend on the phase of the disc. A robot's inputs are those of its tails
-in steady motion (`surrogate.tails`), how the drag of its head compares with that of its tails, and N.
+(w and not v_z, because v_z may vanish). Lag, memory, rest, and size and form of the spread (`encoded_spread`) are
+each written in the principal components of the rows that were learned. Three networks give the components: one
+for the lag, one for memory and rest, which data sets hold for a part of their robots, and one for the spread.
+Robots with two tails have a spread; with more, the lag does not depend on the phase of the disc. A robot's inputs
+are those of its tails in steady motion (`surrogate.tails`), how the drag of its head compares with that of its
+tails, and N.
 
 The components are curves of the simulator. So the curves of the table are smooth, and constant for long dwells.
 Left out: robots with one tail, and robots whose left and right turns differ. Units: l, μ0 l⁴/EI.
@@ -17,6 +18,7 @@ Left out: robots with one tail, and robots whose left and right turns differ. Un
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -41,7 +43,10 @@ SHAPES = {
     "spread": (len(DWELLS), 3),
 }
 PARTS = (("lag",), ("memory", "rest"), ("spread",))  # what each network gives
+COUNTS = {name: math.prod(shape) for name, shape in SHAPES.items()} | {"spread": 3 * (len(DWELLS) + 1)}  # learned
 SMALL_SURGE = 0.1  # of v_x
+TINY_SPREAD = 1e-12  # squared, of the way in one unit of time
+LEAST_FORM = 1e-3  # of the square of a spread over its mean: a sum of components may be negative
 OF_HEAD = (0, 1, 2, 3, 5, 6)  # of the inputs of the head: all but the coupling of sway and turn
 _KNOTS = np.log(DWELLS)
 _INPUTS, _FLIP = len(INPUTS), len(STEADY_OUTPUTS)  # inputs of the tails; the place of the first output of a flip
@@ -72,8 +77,8 @@ class ResponseTable:
                 basis = self.bases[name]
                 end = first + len(basis.vectors)
                 curve = basis.mean + answer[:, first:end] @ basis.vectors
-                if name == "spread":  # its logarithm was learned, of robots with two tails
-                    curve = np.exp(np.where(robots[:, PLACES.number, None] == 2, np.minimum(curve, 0.0), -np.inf))
+                if name == "spread":  # of robots with two tails
+                    curve = np.where(robots[:, PLACES.number, None] == 2, decoded_spread(curve), 0.0)
                 curves[name], first = curve.reshape(-1, *SHAPES[name]) * along_axes(speeds, SHAPES[name]), end
         curves["spread"] = np.abs(curves["spread"])
         return curves
@@ -91,6 +96,25 @@ class ResponseTable:
         lag, memory = self.bases["lag"], self.bases["memory"]
         mean = lag.mean + memory_at_equal_dwells(memory.mean[None])[0]
         return Basis(mean, np.concatenate([lag.vectors, memory_at_equal_dwells(memory.vectors)]))
+
+
+def encoded_spread(spread: Floats) -> Floats:
+    """Return what is learned of spreads (M, D, 3), (M, 3 + 3 D): of each axis the size, then the form.
+
+    That is the mean square over the dwells, as a logarithm, and the square over it, which is smooth where the
+    spread is small and its logarithm is not. All are scaled to errors of the spread; the first acts on D dwells.
+    """
+    square = np.maximum(spread**2, TINY_SPREAD)
+    size = square.mean(1)
+    form = (square / size[:, None] / 2).reshape(len(spread), -1)
+    return np.concatenate([np.log(size) * (spread.shape[1] ** 0.5 / 2), form], 1)
+
+
+def decoded_spread(learned: Floats) -> Floats:
+    """Return spreads, flat (M, 3 D), from what is learned of them (M, 3 + 3 D)."""
+    size = np.exp(np.minimum(learned[:, :3] * (2 / len(DWELLS) ** 0.5), 0.0))
+    form = np.maximum(2 * learned[:, 3:].reshape(-1, *SHAPES["spread"]), LEAST_FORM)
+    return np.asarray(np.sqrt(form * size[:, None])).reshape(len(learned), -1)
 
 
 def memory_at_equal_dwells(flat: Floats) -> Floats:

@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-FORMAT = 8  # of model files
+FORMAT = 9  # of model files
 OUTSIDE, CERTIFIED = "outside", "certified_error"  # columns of an answer
 _MIN_DWELL = DWELLS[0] * (1 - 1e-9)
 _DIFFERENCE = 1e-4  # of an input, relative, for derivatives

@@ -29,7 +29,7 @@ from surrogate.interface import LookupTable
 from surrogate.intervals import GROUPS, THIRDS, Intervals
 from surrogate.motions import FEATURES, INPUT_COUNTS, WrenchTable
 from surrogate.network import Ensemble, state_shapes
-from surrogate.response import FLIP_INPUTS, PARTS, SHAPES, Basis, ResponseTable
+from surrogate.response import COUNTS, FLIP_INPUTS, PARTS, SHAPES, Basis, ResponseTable
 from surrogate.robot_table import load_robot_table
 from surrogate.table import FORMAT, NeuralTable
 from surrogate.tails import INPUTS, TYPICAL
@@ -125,7 +125,6 @@ def _form(content: Mapping[str, Any]) -> dict[str, Any]:
     sizes = [None if part is None else size for part, size in zip(content["wrench"], INPUT_COUNTS, strict=True)]
     if not any(sizes):
         raise WrongFormError("it has no networks")
-    points = {name: math.prod(shape) for name, shape in SHAPES.items()}
     counts = {name: len(content["bases"][name]["vectors"]) for name in SHAPES}
     curves = [_network_form(network, FLIP_INPUTS, sum(counts[name] for name in names))
               for network, names in zip(content["curves"], PARTS, strict=True)]  # fmt: skip
@@ -134,7 +133,7 @@ def _form(content: Mapping[str, Any]) -> dict[str, Any]:
                    for part, size in zip(content["wrench"], sizes, strict=True)],
         "gap": _network_form(content["gap"], len(INPUTS) + 1, 1),
         "curves": curves,
-        "bases": {name: {"mean": (size,), "vectors": (counts[name], size)} for name, size in points.items()},
+        "bases": {name: {"mean": (size,), "vectors": (counts[name], size)} for name, size in COUNTS.items()},
         "support": [size and _support_form(size) for size in sizes],
         "intervals": content["intervals"] and _intervals_form(content["intervals"]),
         "ranges": dict.fromkeys(ROBOT, _is_range),

@@ -17,8 +17,11 @@ What must be simulated is the mean wrench W of one tail over a turn. In the unit
 
 The network sees m as the deflection δ = m a S/(S + 12) that this motion makes. With three or more tails the
 velocities hardly change over a turn, and the wrench of one tail does not depend on N. With one or two tails they
-do. So N = 1 and N = 2 have networks of their own. That of N = 2 has one more input: the head's spin drag over that
-of the tails.
+do. So N = 1 and N = 2 have networks of their own.
+
+Two tails push and turn the robot twice in each turn, and how far it goes depends on the drag of the head. So the
+network of N = 2 sees the drag of the head against sway, surge and turning as well, and that of head, disc and
+motor against spin (PAIR_INPUTS). It does not see side force and couple of the head, which drive the mean motion.
 
 A single tail pushes the robot from side to side in each turn, and how far it goes depends on all drag of the head.
 So the network of N = 1 sees S, a, r0 and the whole resistance of the head (HEAD_INPUTS). These determine the
@@ -64,7 +67,12 @@ HEAD_INPUTS = (
     "ln side force", "spin drag of the disc over that of the head", "yaw couple of the tails' spin", "ln gain",
 )  # fmt: skip
 SINGLE_INPUTS = ("ln S", "ln a", "ln 1/r0", "ln spin drag of head over tails", *HEAD_INPUTS)
+PAIR_INPUTS = (
+    *INPUTS[:-1], "ln spin drag of head, disc and motor over tails",
+    "ln sway drag", "ln surge drag", "ln drag against turning", "coupling of sway and turn",
+)  # fmt: skip
 SMOOTHNESS = (0.7, 1.3, 8.0, 2.0, 4.0, 4.0, 5.0)  # over how many standard deviations the wrench changes
+PAIR_SMOOTHNESS = (*SMOOTHNESS, 3.0, 3.0, 3.0, 3.0)
 SINGLE_SMOOTHNESS = (0.7, 1.3, 8.0, 5.0) + (3.0,) * len(HEAD_INPUTS)
 TYPICAL = ((0.0, 1.0, 0.0, 0.9, 0.2, 0.0), (0.04, 0.4, 0.03, 0.1, 0.3, 0.05))  # mean and spread of y
 SOFT = 12.0  # S from which a tail bends with the flow while it turns
@@ -263,6 +271,13 @@ def inputs_of_tail(
 
 
 @formula
+def inputs_of_pair(tail: Any, head: Any) -> tuple[Any, ...]:
+    """Return PAIR_INPUTS from INPUTS (7, …) and HEAD_INPUTS (9, …)."""
+    spin = tail[6] + np.log(np.exp(-head[8]) + head[6])
+    return tail[0], tail[1], tail[2], tail[3], tail[4], tail[5], spin, head[0], head[1], head[2], head[4]
+
+
+@formula
 def inputs_of_single(perp: Any, offset: Any, radius: Any, spin_drag: Any, spin: Any) -> tuple[Any, ...]:
     """Return the SINGLE_INPUTS before those of the head.
 
@@ -305,7 +320,7 @@ def straight_resistance(robots: RobotColumns) -> Floats:
 
 
 def network_inputs(robots: RobotColumns, motion: Floats, count: int) -> Floats:
-    """Return the inputs of a network of the wrench that has so many: SINGLE_INPUTS or INPUTS, (M, F).
+    """Return the inputs of a network of the wrench that has so many, (M, F): SINGLE_, PAIR_INPUTS or INPUTS.
 
     Args:
         robots: M of them.
@@ -317,7 +332,8 @@ def network_inputs(robots: RobotColumns, motion: Floats, count: int) -> Floats:
         single = inputs_of_single(perp, offset, radius, spin_drag, motion[:, 4])
         return np.concatenate([np.stack(single, -1), robots.head], -1)
     beta = np.arctan2(motion[:, 0], motion[:, 2])
-    return np.stack(inputs_of_tail(perp, offset, radius, robots.number, spin_drag, motion.T, beta), -1)
+    tail = inputs_of_tail(perp, offset, radius, robots.number, spin_drag, motion.T, beta)
+    return np.stack(inputs_of_pair(tail, robots.head.T) if count == len(PAIR_INPUTS) else tail, -1)
 
 
 def wrench_slopes(robots: RobotColumns, motion: Floats) -> Floats:

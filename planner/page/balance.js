@@ -59,7 +59,7 @@ function addProduct(total, x, weights) {
   }
 }
 
-const SINGLE_INPUTS = 13; // of the network of robots with one tail
+const SINGLE_INPUTS = 13, PAIR_INPUTS = 11; // of the networks of robots with one and with two tails
 
 /* Thrust of a tail in linear theory over (ζ⊥ − ζ∥) ω_t a², roughly, at drag number S. */
 function linearThrust(S) {
@@ -71,7 +71,7 @@ function linearTorque(S) {
   return (1 + (S / TORQUE_SOFT) ** 2) ** TORQUE_POWER;
 }
 
-/* The inputs of the networks for two tails and more, of the gap and of the response. */
+/* The inputs of the networks for three tails and more, of the gap and of the response. */
 function tailInputs({ perp, offset, radius, number, spinDrag }, [vX, vZ, yaw, , spin]) {
   const dragNumber = perp * spin;
   const deflection = ((Math.sqrt(vX ** 2 + yaw ** 2 + TINY) / spin) * dragNumber) / (dragNumber + SOFT);
@@ -82,7 +82,7 @@ function tailInputs({ perp, offset, radius, number, spinDrag }, [vX, vZ, yaw, , 
   ];
 }
 
-/* What a single tail feels of its head, from the resistance (4 rows of 5), L, ∂ω_t/∂ω_h, N ζ⊥ and a. */
+/* What one or two tails feel of their head, from the resistance (4 rows of 5), L, ∂ω_t/∂ω_h, N ζ⊥ and a. */
 function headInputs(resistance, length, gain, across, offset) {
   const [sway, surge, turn, spin] = [0, 1, 2, 3].map((i) => resistance[i][i]);
   return [
@@ -98,9 +98,17 @@ function singleInputs({ perp, offset, radius, spinDrag, head }, [, , , , spin]) 
   return [Math.log(perp * spin), Math.log(offset), -Math.log(radius), drag, ...head];
 }
 
+/* The inputs of the network of robots with two tails. */
+function pairInputs(tails, motion) {
+  const inputs = tailInputs(tails, motion), [sway, surge, turn, , coupling, , disc, , gain] = tails.head;
+  const spin = inputs.pop() + Math.log(Math.exp(-gain) + disc);
+  return [...inputs, spin, sway, surge, turn, coupling];
+}
+
 /* The inputs of the network of the wrench that has so many. */
 function networkInputs(tails, motion, count) {
-  return count === SINGLE_INPUTS ? singleInputs(tails, motion) : tailInputs(tails, motion);
+  if (count === SINGLE_INPUTS) return singleInputs(tails, motion);
+  return count === PAIR_INPUTS ? pairInputs(tails, motion) : tailInputs(tails, motion);
 }
 
 /* The terms of the wrench: F_x, F_z, M_y of straight tails; then side force, thrust, torque and m². */

@@ -57,7 +57,7 @@ _NAMES = {  # of each module; a leading underscore is left out
     "surrogate.held_out": "RELATIVE",
     "surrogate.intervals": "NOVELTY",
     "surrogate.table": "OF_TAILS",
-    "surrogate.response": "PARTS SMALL_SURGE OF_HEAD",
+    "surrogate.response": "PARTS SMALL_SURGE OF_HEAD LEAST_FORM",
     "surrogate.domain": "DEGREE DEGREE_OF_MANY MANY MOST_TAILS",
     "surrogate.balance": "STEPS CORRECTION ACCEPTED DIFFERENCE MIN_SHARE FIRST_SPIN MAX_TURN",
     "surrogate.tails": "SOFT SMALL_DEFLECTION SMALL_SURGE MIN_SURGE TINY THRUST THRUST_SOFT THRUST_POWER "

@@ -11,7 +11,7 @@ import { clip, dot, mean } from "./math.js";
 import { BEFORE, CURVE } from "./vehicle.js";
 import { InputError } from "./words.js";
 
-const { OF_TAILS } = CONSTANTS.table, { PARTS, SMALL_SURGE, OF_HEAD } = CONSTANTS.response;
+const { OF_TAILS } = CONSTANTS.table, { PARTS, SMALL_SURGE, OF_HEAD, LEAST_FORM } = CONSTANTS.response;
 const { NORMAL_90, LAGS } = CONSTANTS.error_modes, { NOVELTY } = CONSTANTS.intervals, { RELATIVE } = CONSTANTS.held_out;
 const { DEGREE, DEGREE_OF_MANY, MANY, MOST_TAILS } = CONSTANTS.domain; // of monomials; of so many inputs and more
 const STEADY = ["v_z", "v_x", "omega_yr_bar"];
@@ -20,7 +20,7 @@ const BRANCHES = 0.6; // |ω_yr/ω_t| from which a robot may have several motion
 const REASONS = { // why a robot is outside
   none: "none with as many tails were learned",
   unknown: "its tails or its motor were not learned, or no motion was found",
-  novel: "its tails move as none of the learned ones do",
+  novel: "its tails, or with one or two of them its head, are unlike all learned ones",
   branches: "it yaws nearly as fast as its tails turn, and may have several motions",
 };
 
@@ -62,13 +62,19 @@ function response(table, robot) {
       for (let c = 0; c < vectors.shape[0]; c++, first++) {
         for (let at = 0; at < count; at++) curve[at] += components[first] * vectors.values[c * count + at];
       }
-      curves[name] = curve.map((value, at) => value * speeds[at % 3]);
-      if (name === "spread") { // its logarithm was learned, of robots with two tails
-        curves.spread = curve.map((value, at) => two * Math.exp(Math.min(value, 0)) * Math.abs(speeds[at % 3]));
-      }
+      curves[name] = (name === "spread" ? decodedSpread(curve) : curve).map((value, at) => value * speeds[at % 3]);
     }
   });
+  curves.spread = curves.spread.map((value) => two * Math.abs(value)); // of robots with two tails
   return curves;
+}
+
+/* A spread from what is learned of it: of each axis the logarithm of its mean square, and its square over that. */
+function decodedSpread(learned) {
+  const scale = 2 / Math.sqrt(learned.length / 3 - 1);
+  const size = Array.from(learned.subarray(0, 3), (value) => Math.exp(Math.min(scale * value, 0)));
+  const form = Array.from(learned.subarray(3), (value) => Math.max(2 * value, LEAST_FORM));
+  return Float64Array.from(form, (value, at) => Math.sqrt(value * size[at % 3]));
 }
 
 /* (w, v_x, ω_yr) of the head's centre, by which the curves are divided. */

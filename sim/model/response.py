@@ -30,6 +30,7 @@ BEFORE = np.geomspace(0.2, 1.2, 16)  # T̄ of the dwell before
 FORGOTTEN = 1.4  # T̄ of the dwell before from which on the response is that after a long one
 LAG_PARTS = ("z", "x", "psi_rad")  # of a lag: forward, to the side of the new turn, heading
 LAGS = tuple(f"lag_{part}" for part in LAG_PARTS)  # columns
+_NEAR = 1.5  # ratio of dwells over which a spread is averaged
 SETTLED = 2.0  # time units after a flip from which the lag is constant
 
 
@@ -46,6 +47,20 @@ class Responses:
     failed: Flags  # (B,)
     stepped: Flags  # (B,): by time steps
     before: Floats = field(default_factory=BEFORE.copy)  # (K,), T̄ of the dwell before, of `memory`
+
+
+def typical_spread(spread: Floats, dwells: Floats = DWELLS) -> Floats:
+    """Return the root mean square of spreads (..., D, 3) over dwells up to 1.5 times as long or as short.
+
+    The lag depends on the disc's phase at the end of a dwell, too. So the spread rises and falls with the dwell,
+    at N times the spin of the disc, with two tails up to ten times. Curves at D dwells cannot follow that. Dwells
+    after SETTLED are as the last ones before.
+    """
+    sampled = np.arange(len(dwells)) <= np.searchsorted(dwells, SETTLED)
+    centres = np.clip(dwells, _NEAR * dwells[0], SETTLED / _NEAR)
+    apart = np.abs(np.log(np.minimum(dwells, SETTLED) / centres[:, None]))
+    near = (apart <= np.log(_NEAR) * (1 + 1e-9)) & sampled
+    return np.asarray(np.sqrt(np.einsum("ij,...jk->...ik", near / near.sum(1, keepdims=True), spread**2)))
 
 
 def at_equal_dwells(memory: Floats, knots: Floats = BEFORE, dwells: Floats = DWELLS) -> Floats:

@@ -36,13 +36,15 @@ _UNKNOWN = "straight tails may reach another motion than the one in which they m
 
 
 @np.errstate(all="ignore")  # robots that overflow are flagged
-def steady(groups: Groups, *, stability: bool = True) -> Steady:
+def steady(groups: Groups, *, stability: bool = True, phases: int = PHASES) -> Steady:
     """Simulate the steady motion of robots of one N, as reached from rest.
 
     Args:
         groups: B robots; ω̄ may have either sign.
         stability: whether to compute the growth of small perturbations of every robot, which adds a quarter to the
             time. If not, only robots whose tails push against each other get one.
+        phases: number of phases to begin with. The error of the means is below PHASE_ERROR with any of them; with
+            more to begin with it is far below that.
 
     Returns:
         Their mean motion, dimensionless (lengths in l, times in μ0 l⁴/EI), and how good it is.
@@ -57,7 +59,7 @@ def steady(groups: Groups, *, stability: bool = True) -> Steady:
         (0.049, True)
     """
     check_effects(groups.effects)
-    motion = orbits(groups, stability=stability)
+    motion = orbits(groups, phases=phases, stability=stability)
     quick = np.abs(motion.omega_yr) > QUICK * np.abs(motion.omega_t)
     contact = groups.effects.get(CONTACT.name, np.zeros(len(groups))) != 0
     grows = motion.growth > np.where(contact, GROWS_IN_CONTACT, GROWS)

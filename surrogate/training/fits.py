@@ -14,6 +14,7 @@ The response is learned as components of curves, see `surrogate.response`.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,11 +22,13 @@ import torch
 from torch import Tensor
 
 from common.arrays import Flags, Floats, Integers
+from sim.model.response import typical_spread
 from surrogate.motions import CLASSES, INPUT_COUNTS, WrenchTable, network_index
 from surrogate.network import Ensemble
-from surrogate.response import PARTS, SHAPES, Basis, ResponseTable, along_axes, flip_inputs
+from surrogate.response import PARTS, SHAPES, Basis, ResponseTable, along_axes, encoded_spread, flip_inputs
 from surrogate.tails import (
     INPUTS,
+    PAIR_SMOOTHNESS,
     SINGLE_SMOOTHNESS,
     SMOOTHNESS,
     TYPICAL,
@@ -40,11 +43,11 @@ from surrogate.tails import (
 from surrogate.training.networks import Settings, TrainableEnsemble, TrainingContext, fit
 
 TURNS = 1.3  # largest |ω_yr/ω_t| that is learned
+_FURTHER = 3  # part of the iterations with which a trained network goes on
 _OUTLIER = 10.0  # rows that weigh more than this many times the median weigh only so much
 _GAP = Settings(width=24, depth=2, members=1, epochs=60, iterations=200)
-COMPONENTS = {"lag": 32, "memory": 32, "rest": 32, "spread": 8}
+COMPONENTS = {"lag": 32, "memory": 32, "rest": 32, "spread": 32}
 CURVES = Settings(width=48, depth=2, members=2, epochs=200, iterations=150)
-_MIN_SPREAD = 1e-6  # of the way in one unit of time
 _SMOOTH = 2.0  # standard deviations over which the components change
 
 
@@ -84,7 +87,12 @@ def learnable(rows: WrenchSamples) -> Flags:
 
 
 def fit_wrench(
-    rows: WrenchSamples, settings: Settings, context: TrainingContext, *, few_settings: Settings | None = None
+    rows: WrenchSamples,
+    settings: Settings,
+    context: TrainingContext,
+    *,
+    few_settings: Settings | None = None,
+    start: WrenchTable | None = None,
 ) -> WrenchTable:
     """Fit the networks of all CLASSES, and that of the gap, to samples that are `learnable`.
 
@@ -93,19 +101,23 @@ def fit_wrench(
         settings: of the networks.
         context: device, progress bars, and where states are kept.
         few_settings: of the networks of robots with one and two tails, which are harder; by default `settings`.
+        start: networks from which those of the same shape go on; they have been through Adam.
     """
     networks: list[Ensemble | None] = []
+    trained = start.wrench if start else (None,) * len(CLASSES)
     for k, count in enumerate(CLASSES):
         samples = rows.at(network_index(rows.robots.number) == k)
         part = context.part(f"tails of N = {count}{' and more' if count == CLASSES[-1] else ''}")
         own = few_settings if few_settings and count <= 2 else settings
-        networks.append(_fit_class(samples, own, part, k) if len(samples.motion) else None)
+        networks.append(_fit_class(samples, own, part, k, trained[k]) if len(samples.motion) else None)
     gap = _fit_gap(rows.at(rows.robots.number > 1), _GAP, context.part("gap"))
     return WrenchTable(tuple(networks), gap)
 
 
-def _fit_class(rows: WrenchSamples, settings: Settings, context: TrainingContext, k: int) -> Ensemble:
-    """Fit the network of CLASSES[k] to its samples."""
+def _fit_class(
+    rows: WrenchSamples, settings: Settings, context: TrainingContext, k: int, start: Ensemble | None
+) -> Ensemble:
+    """Fit the network of CLASSES[k] to its samples, from its start or from random numbers."""
     robots, motion = rows.robots, rows.motion
     weight = motion_sensitivity(robots, motion)
     matrix = weight @ wrench_slopes(robots, motion)
@@ -115,7 +127,7 @@ def _fit_class(rows: WrenchSamples, settings: Settings, context: TrainingContext
     mean, spread = np.array(TYPICAL)
     size = np.linalg.norm(matrix * spread, axis=(1, 2))
     share = np.minimum(_OUTLIER * np.quantile(size, 0.5, method="lower") / size, 1.0)
-    smoothness = np.array(SINGLE_SMOOTHNESS if CLASSES[k] == 1 else SMOOTHNESS) / 1.5
+    smoothness = np.array((SINGLE_SMOOTHNESS, PAIR_SMOOTHNESS, SMOOTHNESS)[k]) / 1.5
 
     def residual(y: Tensor, matrix: Tensor, wanted: Tensor) -> Tensor:
         return (matrix @ y[..., None])[..., 0] - wanted
@@ -125,7 +137,8 @@ def _fit_class(rows: WrenchSamples, settings: Settings, context: TrainingContext
     if CLASSES[k] == CLASSES[-1]:
         scale[-1] = 1e9  # the head's spin drag plays no part
     data = (matrix, wanted)
-    return _fitted(inputs, scale, mean, spread, data, residual, settings, context, "% of their motion", share)
+    unit = "% of their motion"
+    return _fitted(inputs, scale, mean, spread, data, residual, settings, context, unit, share, start)
 
 
 def _fit_gap(rows: WrenchSamples, settings: Settings, context: TrainingContext) -> Ensemble:
@@ -144,19 +157,19 @@ def fit_response(
     rows: WrenchSamples, curves: Mapping[str, Floats], settings: Settings, context: TrainingContext
 ) -> ResponseTable:
     """Fit a table to curves of robots, by name as in SHAPES, each (M, …, 3); NaN where one was not simulated."""
-    parts = [_fit_part(names, rows, curves, settings, context) for names in PARTS]
+    parts = [fit_part(names, rows, curves, settings, context) for names in PARTS]
     bases = {name: basis for _, of_part in parts for name, basis in of_part.items()}
     return ResponseTable(tuple(network for network, _ in parts), bases)
 
 
-def _fit_part(
+def fit_part(
     names: Sequence[str],
     rows: WrenchSamples,
     curves: Mapping[str, Floats],
     settings: Settings,
     context: TrainingContext,
 ) -> tuple[Ensemble, dict[str, Basis]]:
-    """Fit the network of some curves, one of PARTS, and their bases; see `fit_response`."""
+    """Fit the network of some curves, one of PARTS, and return it with their bases; see `fit_response`."""
     robots, tails = rows.robots, network_inputs(rows.robots, rows.motion, len(INPUTS))
     inputs, speeds = flip_inputs(pack_robots(robots), rows.motion, tails)
     known = np.all([np.isfinite(curves[n]).reshape(len(inputs), -1).all(1) for n in names], axis=0)
@@ -166,7 +179,7 @@ def _fit_part(
     for name in names:
         scaled = (curves[name][known] / along_axes(speeds[known], SHAPES[name])).reshape(known.sum(), -1)
         if name == "spread":
-            scaled = np.log(np.maximum(np.abs(scaled), _MIN_SPREAD))
+            scaled = encoded_spread(typical_spread(scaled.reshape(-1, *SHAPES[name])))
         bases[name] = _basis(scaled, COMPONENTS[name])
         targets.append((scaled - bases[name].mean) @ bases[name].vectors.T)
         weights += [(3 / np.prod(SHAPES[name])) ** 0.5] * len(bases[name].vectors)
@@ -178,7 +191,7 @@ def _fit_part(
         return (y - wanted) * weights
 
     data = (wanted, np.broadcast_to(weights, wanted.shape).copy())
-    unit = "of the logarithm" if "spread" in names else "% of the way in one unit of time"
+    unit = "% of the spread" if "spread" in names else "% of the way in one unit of time"
     part, mean = context.part(" and ".join(names)), np.zeros(wanted.shape[1])
     return _fitted(inputs, scale, mean, spread, data, residual, settings, part, unit), bases
 
@@ -200,14 +213,20 @@ def _deviation(inputs: Floats) -> Floats:
 def _fitted(
     inputs: Floats, scale: Floats, mean: Floats, spread: Floats, data: Sequence[Floats],
     residual: Callable[..., Tensor], settings: Settings, context: TrainingContext, unit: str,
-    weights: Floats | None = None,
+    weights: Floats | None = None, start: Ensemble | None = None,
 ) -> Ensemble:  # fmt: skip
-    """Fit a network with this scale of its inputs (M, F), and mean and spread of its outputs (O,)."""
+    """Fit a network with this scale of its inputs (M, F), and mean and spread of its outputs (O,).
+
+    From a start of the same shape it goes on for a part of the iterations, without Adam, which would lose it.
+    """
     sizes = {name: getattr(settings, name) for name in ("width", "depth", "members", "seed")}
     network = TrainableEnsemble(inputs.shape[1], len(mean), **sizes)
     numbers = {"shift": inputs.mean(0), "scale": scale, "mean": mean, "spread": spread}
     for name, values in numbers.items():
         getattr(network, name).copy_(torch.from_numpy(values))
+    if start is not None and start.shape == network.shape:
+        network.load_state_dict({name: torch.from_numpy(part) for name, part in start.state.items()})
+        settings = replace(settings, epochs=0, iterations=settings.iterations // _FURTHER)
     x, *parts = map(torch.from_numpy, (inputs, *data))
     of_rows = None if weights is None else torch.from_numpy(weights)
     fit(network, x, parts, residual, settings, context, weights=of_rows, unit=unit)

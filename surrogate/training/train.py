@@ -26,10 +26,18 @@ from surrogate.error_modes import KINDS, CurveErrors
 from surrogate.held_out import curve_errors, relative_errors, summary
 from surrogate.intervals import Intervals
 from surrogate.motions import CLASSES, INPUT_COUNTS, network_index
-from surrogate.response import PARTS, SHAPES, along_axes, flip_inputs
+from surrogate.response import PARTS, SHAPES, ResponseTable, along_axes, flip_inputs
 from surrogate.table import NeuralTable
 from surrogate.tails import network_inputs
-from surrogate.training.fits import CURVES, WrenchSamples, fit_response, fit_wrench, learnable, wrench_samples
+from surrogate.training.fits import (
+    CURVES,
+    WrenchSamples,
+    fit_part,
+    fit_response,
+    fit_wrench,
+    learnable,
+    wrench_samples,
+)
 from surrogate.training.networks import Settings, TrainingContext, device_named
 from surrogate.training.simulated import SimulatedRobots, join_robots, read_robots, simulate_robots
 
@@ -183,14 +191,15 @@ def with_tails(
     source: dict[str, Any] | None = None,
     context: TrainingContext = _QUIET,
 ) -> NeuralTable:
-    """Return a table with steady motions learned anew; its response to a flip, which depends on none, stays.
+    """Return a table with steady motions learned further; its response to a flip, which depends on none, stays.
 
     Args:
-        lookup: the table that gives the response and its errors.
+        lookup: the table that gives the response and its errors, and the networks from which those of the same
+            shape go on; others are learned anew.
         learned, width_rows, held_out, settings, few_settings, source, context: as for `learn`.
     """
     rows, _ = _learnable(learned)
-    tails = fit_wrench(rows, settings, context, few_settings=few_settings)
+    tails = fit_wrench(rows, settings, context, few_settings=few_settings, start=lookup.tails)
     counts = {"train": len(rows.motion), "widths": len(width_rows), "held_out": len(held_out)}
     created = _created(settings, few_settings, lookup.provenance["config"]["curves"], context)
     learned_first = {name: lookup.provenance[name] for name in _OF_RESPONSE if name in lookup.provenance}
@@ -207,6 +216,31 @@ def with_tails(
         },
     )
     return _with_intervals(again, width_rows, held_out)
+
+
+def with_spread(
+    lookup: NeuralTable,
+    flipped: SimulatedRobots,
+    settings: Settings,
+    *,
+    source: dict[str, Any] | None = None,
+    context: TrainingContext = _QUIET,
+) -> NeuralTable:
+    """Return a table whose spread of the lag over the disc's phase is learned anew.
+
+    Args:
+        lookup: the table.
+        flipped: robots with two tails, with lag and spread.
+        settings: of the network.
+        source: where the robots come from, for the provenance.
+        context: as for `learn`.
+    """
+    rows, usable = _learnable(flipped)
+    network, bases = fit_part(("spread",), rows, flipped.at(usable).curves, settings, context.part("spread"))
+    curves = ResponseTable((*lookup.curves.networks[:-1], network), {**lookup.curves.bases, **bases})
+    learned_first = lookup.provenance.get("response", {})
+    response = {**learned_first, "spread": {**(source or {}), "rows": len(rows.motion)}}
+    return replace(lookup, curves=curves, provenance={**lookup.provenance, "response": response})
 
 
 def _created(

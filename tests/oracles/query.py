@@ -83,6 +83,17 @@ def single_inputs(r: PositiveRobots, u: Any) -> Any:
     return np.concatenate([tail_inputs(r, u)[[0, 1, 2, 6]], r.own.head.T])
 
 
+def pair_inputs(r: PositiveRobots, u: Any) -> Any:
+    """Return the inputs of the network of two tails, (11, M)."""
+    t, x, (sway, surge, turn, _) = r.own, tail_inputs(r, u), r.R[[0, 1, 2, 3], [0, 1, 2, 3]]
+    across, spin = t.number * t.perp, r.R[3, 3] / t.gain + r.R[3, 4]
+    drags = np.log([spin / t.offset**2 / across, sway / across, surge / across, turn / across])
+    return np.array([*x[:6], *drags, r.R[0, 2] / np.sqrt(sway * turn)])
+
+
+INPUTS = {13: single_inputs, 11: pair_inputs, 7: tail_inputs}  # of networks, by their number
+
+
 def residual(r: PositiveRobots, u: Any, y: Any) -> Any:
     """Return the wrench of the tails less that on the head, (4, ..., M), at motions u (5, ..., M)."""
     t, S, side = r.own, r.own.perp * u[4], side_speed(u)
@@ -110,7 +121,7 @@ def first_guess(r: PositiveRobots) -> Any:
 
 def solve(network: Ensemble, r: PositiveRobots) -> tuple[Any, Any]:
     """Return motions (5, M) in balance, and which were found."""
-    inputs = single_inputs if network.shape["inputs"] == 13 else tail_inputs
+    inputs = INPUTS[network.shape["inputs"]]
     u, rows = first_guess(r), np.arange(len(r.own.speed))
     motion, size, y = np.empty_like(u), np.empty(len(rows)), members(network, inputs(r, u)).mean(0)
     width = 1e-6 * (np.abs(u[:4]) + 1e-3 * np.abs(u[:4]).max(0))
@@ -173,7 +184,7 @@ def _part(table: NeuralTable, k: int, r: PositiveRobots, within: Any, dwells: An
     assert network is not None
     assert support is not None
     u, found = solve(network, r)
-    x, own = tail_inputs(r, u), single_inputs(r, u) if k == 0 else tail_inputs(r, u)
+    x, own = tail_inputs(r, u), INPUTS[network.shape["inputs"]](r, u)
     novelty, number = novelty_of(support, own), r.own.number
     outside = ~(found & within & (novelty <= 1) & (np.abs(u[2]) <= 0.6 * np.abs(u[4])))
     sway, surge, yaw = u[0] + u[2] * r.own.head_length / 2, u[1], u[2]

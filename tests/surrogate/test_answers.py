@@ -81,7 +81,7 @@ BEYOND: list[tuple[dict[str, float], str, str, str]] = [
     ({"tail_radius": 0.02}, "tail_radius", "mm", "tail radius 20 mm (l_over_r0 = 5.5)"),
     ({"disc_offset": 0.0016}, "disc_offset", "mm", "disc offset 1.6 mm (a_over_R = 0.1)"),
     ({"tail_length": 0.3}, "tail_length", "cm", "tail length 30 cm (l_over_R = 18.8)"),
-    ({"C_t": 0.01, "C_yr": 10.0, "motor_speed": to_si(9.0, "rpm")}, "motor_speed", "rpm",
+    ({"tails": 3, "C_t": 0.01, "C_yr": 10.0, "motor_speed": to_si(9.0, "rpm")}, "motor_speed", "rpm",
      "it yaws nearly as fast as its tails turn, and may have several motions; motor speed 9 rpm (omega_bar"),
 ]  # fmt: skip
 

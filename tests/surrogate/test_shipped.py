@@ -13,13 +13,12 @@ import pytest
 from common.errors import InputError, run_command
 from dataset.design import load_design
 from sim.model.presets import INDEPENDENT
-from sim.motion.batches import steady_columns
 from surrogate.__main__ import main
 from surrogate.domain import BOUNDS, DOMAIN, MOST_TAILS, WIDE
 from surrogate.held_out import coverage, relative_errors
 from surrogate.inverse import inverse
 from surrogate.table_file import SHIPPED, load
-from surrogate.training.simulated import draw_as_users, draw_robots
+from surrogate.training.simulated import draw_as_users, draw_robots, reached_columns
 from surrogate.training.train import with_radius
 from tests.processes import LIMIT
 from tests.reference.cases import STEADY_INPUTS, STEADY_POINTS
@@ -64,7 +63,7 @@ def answered(robots: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], dict
     """Return the table's answers, the simulator's (NaN outside the domain), and which robots both know."""
     answer = load().query(robots, intervals=True, flag=True)
     good = ~answer["outside"]
-    simulated = steady_columns({name: values[good] for name, values in robots.items()}, title="", stability=False)
+    simulated = reached_columns({name: values[good] for name, values in robots.items()})
     truth = {}
     for name in ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "tail_gap"):
         truth[name] = np.full(len(good), np.nan)

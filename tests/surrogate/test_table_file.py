@@ -67,8 +67,8 @@ def test_what_is_no_model_is_refused(content: bytes, expected: str, tmp_path: Pa
     path = tmp_path / "m.safetensors"
     path.write_bytes(content)
     assert expected in refusal(path)
-    tensor_file.write(path, table_content(load()), 7)
-    assert "has format 7, this version reads 8; train it again" in refusal(path)
+    tensor_file.write(path, table_content(load()), FORMAT - 1)
+    assert f"has format {FORMAT - 1}, this version reads {FORMAT}; train it again" in refusal(path)
 
 
 def edited(change: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import pytest
 from common.errors import InputError
 from sim.mechanics import planar
 from sim.model.groups import Groups
-from sim.model.response import BEFORE, DWELLS, FORGOTTEN, Responses, memory_after
+from sim.model.response import BEFORE, DWELLS, FORGOTTEN, Responses, memory_after, typical_spread
 from sim.model.schedule import Schedule
 from sim.motion import response
 from sim.motion.replay import replay, replay_error
@@ -47,6 +47,19 @@ def test_curves_agree_with_time_steps(omega_bar: float, changes: dict[str, float
     assert curves.memory[0][[1, 3]][:, FEW] == pytest.approx(memory, abs=5e-4)
     assert curves.rest[0, FEW] == pytest.approx(rest, abs=6e-4)
     assert curves.spread[0, FEW] == pytest.approx(spread, abs=4e-4)
+
+
+@pytest.mark.parametrize("omega_bar", [6.0, 12.0, 25.0])
+def test_a_typical_spread_is_the_mean_of_what_its_dwells_cannot_follow(omega_bar: float) -> None:
+    groups, many = control(N=2.0, omega_bar=omega_bar), np.linspace(0.9, 1.95, 43)
+    rising_and_falling = responses(groups, history=False, dwells=many).spread[0]
+    assert rising_and_falling[:, 2].max() > 1.9 * rising_and_falling[:, 2].min()
+    found = typical_spread(responses(groups, history=False).spread[0])
+    assert found[DWELLS > 1.4] == pytest.approx(np.tile(rms(rising_and_falling), (9, 1)), rel=0.1)
+
+
+def rms(values: np.ndarray) -> np.ndarray:
+    return np.asarray(np.sqrt((values**2).mean(0)))
 
 
 def test_other_dwells_do_not_change_the_curves() -> None:
