@@ -46,7 +46,7 @@ TURNS = 1.3  # largest |ω_yr/ω_t| that is learned
 _FURTHER = 3  # part of the iterations with which a trained network goes on
 _OUTLIER = 10.0  # rows that weigh more than this many times the median weigh only so much
 _GAP = Settings(width=24, depth=2, members=1, epochs=60, iterations=200)
-COMPONENTS = {"lag": 32, "memory": 32, "rest": 32, "spread": 32}
+_COMPONENTS = 32  # of each kind of curve
 CURVES = Settings(width=48, depth=2, members=2, epochs=200, iterations=150)
 _SMOOTH = 2.0  # standard deviations over which the components change
 
@@ -180,7 +180,7 @@ def fit_part(
         scaled = (curves[name][known] / along_axes(speeds[known], SHAPES[name])).reshape(known.sum(), -1)
         if name == "spread":
             scaled = encoded_spread(typical_spread(scaled.reshape(-1, *SHAPES[name])))
-        bases[name] = _basis(scaled, COMPONENTS[name])
+        bases[name] = _basis(scaled, _COMPONENTS)
         targets.append((scaled - bases[name].mean) @ bases[name].vectors.T)
         weights += [(3 / np.prod(SHAPES[name])) ** 0.5] * len(bases[name].vectors)
     wanted, inputs = np.concatenate(targets, -1), inputs[known]
