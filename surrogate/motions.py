@@ -20,7 +20,8 @@ from surrogate.network import BLOCK, Ensemble, Layers, evaluate
 from surrogate.tails import INPUTS, PAIR_INPUTS, PLACES, SINGLE_INPUTS
 
 CLASSES = (1, 2, 3)  # networks for N = 1, N = 2, and three or more tails
-INPUT_COUNTS = (len(SINGLE_INPUTS), len(PAIR_INPUTS), len(INPUTS))  # of these networks
+# Of these networks; that of two tails has the latter number where it learned from few rows.
+INPUT_COUNTS = ((len(SINGLE_INPUTS),), (len(PAIR_INPUTS), len(INPUTS)), (len(INPUTS),))
 SPREAD, TINY_SPREAD = 8, 1e-9  # the spread of the members among what widths depend on, as a logarithm
 _INPUTS, _OUTPUTS = len(INPUTS), 12
 FEATURES = _INPUTS + 4  # that widths of intervals depend on

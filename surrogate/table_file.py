@@ -122,7 +122,7 @@ class WrongFormError(Exception):
 
 def _form(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the parts of a content must be, see `_check`."""
-    sizes = [None if part is None else size for part, size in zip(content["wrench"], INPUT_COUNTS, strict=True)]
+    sizes = [part and _input_count(part, may) for part, may in zip(content["wrench"], INPUT_COUNTS, strict=True)]
     if not any(sizes):
         raise WrongFormError("it has no networks")
     counts = {name: len(content["bases"][name]["vectors"]) for name in SHAPES}
@@ -171,6 +171,12 @@ def _check(part: Any, form: Any, place: str) -> None:
             raise WrongFormError(f"{place} is not {' × '.join(map(str, form))} finite numbers")
     elif not (form(part) if callable(form) else part == form and type(part) is type(form)):
         raise WrongFormError(f"{place} is wrong")
+
+
+def _input_count(stored: Mapping[str, Any], possible: tuple[int, ...]) -> int:
+    """Return the number of inputs that a network must have: its own, if that is possible."""
+    own = len(stored["state"]["shift"])
+    return own if own in possible else possible[0]
 
 
 def _network_form(stored: Mapping[str, Any], inputs: int, outputs: int) -> dict[str, Any]:

@@ -43,6 +43,8 @@ from surrogate.tails import (
 from surrogate.training.networks import Settings, TrainableEnsemble, TrainingContext, fit
 
 TURNS = 1.3  # largest |ω_yr/ω_t| that is learned
+_MANY = 1024  # rows from which all inputs are worth having
+_SMOOTHNESS = {len(some): some for some in (SINGLE_SMOOTHNESS, PAIR_SMOOTHNESS, SMOOTHNESS)}
 _FURTHER = 3  # part of the iterations with which a trained network goes on
 _OUTLIER = 10.0  # rows that weigh more than this many times the median weigh only so much
 _GAP = Settings(width=24, depth=2, members=1, epochs=60, iterations=200)
@@ -127,12 +129,13 @@ def _fit_class(
     mean, spread = np.array(TYPICAL)
     size = np.linalg.norm(matrix * spread, axis=(1, 2))
     share = np.minimum(_OUTLIER * np.quantile(size, 0.5, method="lower") / size, 1.0)
-    smoothness = np.array((SINGLE_SMOOTHNESS, PAIR_SMOOTHNESS, SMOOTHNESS)[k]) / 1.5
+    count = INPUT_COUNTS[k][-1 if len(motion) < _MANY else 0]
+    smoothness = np.array(_SMOOTHNESS[count]) / 1.5
 
     def residual(y: Tensor, matrix: Tensor, wanted: Tensor) -> Tensor:
         return (matrix @ y[..., None])[..., 0] - wanted
 
-    inputs = network_inputs(robots, motion, INPUT_COUNTS[k])
+    inputs = network_inputs(robots, motion, count)
     scale = smoothness * _deviation(inputs)
     if CLASSES[k] == CLASSES[-1]:
         scale[-1] = 1e9  # the head's spin drag plays no part

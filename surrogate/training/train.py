@@ -25,7 +25,7 @@ from surrogate.domain import INSIDE, MAX_YAW_SHARE, ROBOT, Support
 from surrogate.error_modes import KINDS, CurveErrors
 from surrogate.held_out import curve_errors, relative_errors, summary
 from surrogate.intervals import Intervals
-from surrogate.motions import CLASSES, INPUT_COUNTS, network_index
+from surrogate.motions import WrenchTable, network_index
 from surrogate.response import PARTS, SHAPES, ResponseTable, along_axes, flip_inputs
 from surrogate.table import NeuralTable
 from surrogate.tails import network_inputs
@@ -171,7 +171,7 @@ def learn(
     lookup = NeuralTable(
         tails=table,
         curves=response,
-        support=_supports(rows),
+        support=_supports(rows, table),
         intervals=None,
         ranges=_ranges(learned),
         errors={},
@@ -206,7 +206,7 @@ def with_tails(
     again = replace(
         lookup,
         tails=tails,
-        support=_supports(rows),
+        support=_supports(rows, tails),
         ranges=_ranges(learned),
         provenance={
             **created,
@@ -251,12 +251,16 @@ def _created(
     return provenance({**of_tails, "curves": curves, "device": context.device})
 
 
-def _supports(rows: WrenchSamples) -> tuple[Support | None, ...]:
-    """Learn the domain of each of CLASSES, from the inputs of its network; None where there are no rows."""
-    kind = network_index(rows.robots.number)
-    parts = [rows.at(kind == k) for k in range(len(CLASSES))]
-    inputs = [network_inputs(p.robots, p.motion, size) for p, size in zip(parts, INPUT_COUNTS, strict=True)]
-    return tuple(Support.learned(x) if len(x) else None for x in inputs)
+def _supports(rows: WrenchSamples, tails: WrenchTable) -> tuple[Support | None, ...]:
+    """Learn the domain of each network from its inputs; None where there is no network."""
+    kind, supports = network_index(rows.robots.number), list[Support | None]()
+    for k, network in enumerate(tails.wrench):
+        part = rows.at(kind == k)
+        if network is None:
+            supports.append(None)
+        else:
+            supports.append(Support.learned(network_inputs(part.robots, part.motion, network.shape["inputs"])))
+    return tuple(supports)
 
 
 def _judged(

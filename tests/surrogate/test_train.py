@@ -129,6 +129,21 @@ def test_the_spread_of_two_tails_is_learned_apart() -> None:
     assert not again.response(three, flag=True).spread.any()
 
 
+@pytest.mark.parametrize(("many", "inputs"), [(100, 11), (1000, 7)])
+def test_two_tails_see_the_drag_of_the_head_where_there_are_rows_to_learn_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, many: int, inputs: int
+) -> None:
+    monkeypatch.setattr(fits, "_MANY", many)
+    drawn = draw_robots(160, 18, wide=False) | {"N": np.full(160, 2.0)}
+    pairs = simulate_robots(drawn)
+    training.learn(pairs, pairs, pairs, flips(), TAILS, CURVES).save(tmp_path / "pairs.safetensors")
+    lookup = load(tmp_path / "pairs.safetensors")
+    network = lookup.tails.wrench[1]
+    assert network is not None
+    assert network.shape["inputs"] == inputs
+    assert error_of_yaw(lookup, pairs) < 0.05
+
+
 def test_what_is_learned_of_a_spread_gives_it_back() -> None:
     spread = np.random.default_rng(3).uniform(-1, -0.1, size=(5, 25, 3)) * [1e-4, 1e-2, 0.3]
     assert decoded_spread(encoded_spread(spread)) == pytest.approx(np.abs(spread).reshape(5, -1), abs=2e-6)
