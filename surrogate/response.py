@@ -43,7 +43,8 @@ SHAPES = {
     "spread": (len(DWELLS), 3),
 }
 PARTS = (("lag",), ("memory", "rest"), ("spread",))  # what each network gives
-COUNTS = {name: math.prod(shape) for name, shape in SHAPES.items()} | {"spread": 3 * (len(DWELLS) + 1)}  # learned
+# Numbers of a curve as it is learned, see `encoded_spread`.
+COUNTS = {name: math.prod(shape) for name, shape in SHAPES.items()} | {"spread": 3 * (len(DWELLS) + 1)}
 SMALL_SURGE = 0.1  # of v_x
 TINY_SPREAD = 1e-12  # squared, of the way in one unit of time
 LEAST_FORM = 1e-3  # of the square of a spread over its mean: a sum of components may be negative

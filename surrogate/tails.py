@@ -21,7 +21,8 @@ do. So N = 1 and N = 2 have networks of their own.
 
 Two tails push and turn the robot twice in each turn, and how far it goes depends on the drag of the head. So the
 network of N = 2 sees the drag of the head against sway, surge and turning as well, and that of head, disc and
-motor against spin (PAIR_INPUTS). It does not see side force and couple of the head, which drive the mean motion.
+motor against spin (PAIR_INPUTS), if it learned from many rows. It does not see side force and couple of the head,
+which drive the mean motion.
 
 A single tail pushes the robot from side to side in each turn, and how far it goes depends on all drag of the head.
 So the network of N = 1 sees S, a, r0 and the whole resistance of the head (HEAD_INPUTS). These determine the
