@@ -102,7 +102,7 @@ OUTPUTS = (
            kept=True),
     _curve("net_speed_bar", "EI/(mu0 l^3)", "net speed when the motor flips after every dwell"),
     *_curves("lag", "lag after a flip"),
-    *_curves("spread", "standard deviation of the lag over the disc's phase at the flip"),
+    *_curves("spread", "standard deviation of the lag over the disc's phase at the flip, without the wobble"),
     *_curves("rest", "lag of a first dwell from rest; NaN without history"),
     *_curves("memory", "what a short dwell before adds to the lag; NaN without history", tuple(BEFORE)),
 )  # fmt: skip

@@ -38,7 +38,7 @@ _KEPT = 0.999  # share of the variance
 CURVE_ERRORS = "curve_errors"  # the entry of a model file; files of earlier versions lack it
 KINDS = ("lag", "memory")
 NORMAL_90 = 1.6449  # half of an interval that holds 90 % of a normal distribution, in standard deviations
-_OUTLIER = 2.5
+_OUTLIER = 5.0
 _KEPT_OF_LEARNED = 0.985  # of the variance
 
 

@@ -29,7 +29,7 @@ from common.provenance import provenance
 from sim.effects import effect_named, is_effect
 from sim.mechanics import planar
 from sim.model.groups import Groups
-from sim.model.response import BEFORE, DWELLS, LAGS, Responses, memory_after, typical_spread
+from sim.model.response import BEFORE, DWELLS, LAGS, Responses, memory_after
 from sim.model.robot import Robot
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay
@@ -86,7 +86,7 @@ def tabulate(robot: Robot) -> RobotTable:
         before=BEFORE.tolist(),
         memory=response.memory.tolist(),
         rest=response.rest.tolist(),
-        spread=typical_spread(response.spread).tolist(),
+        spread=response.spread.tolist(),
         slopes=_slopes(values),
         errors={},
         error_curves=[],

@@ -1,25 +1,25 @@
 """Train the look-up table that comes with the package, and evaluate it on held-out robots.
 
-Usage: python -m benchmarks shipped_table WORK --response TABLE --out MODEL    keeps the response of TABLE
-       softflagella sweep --config surrogate/shipped/domain.toml --out SWEEP
-       python -m benchmarks shipped_table WORK --sweep SWEEP --out MODEL    the response is learned, too
+Usage: python -m benchmarks shipped_table WORK --out MODEL    everything
+       python -m benchmarks shipped_table WORK --response TABLE --out MODEL    keeps the response of TABLE
+       python -m benchmarks shipped_table WORK --tails TABLE --out MODEL    keeps the tails of TABLE
        python -m benchmarks shipped_table WORK --calibrate MODEL [--out MODEL]    its intervals alone, anew
        python -m benchmarks shipped_table WORK --test MODEL [--card CARD] [--picture PNG]
 
 Sets that are simulated are kept in WORK. --test prints errors on robots of the test set; `python -m benchmarks
-lookup` the coverage of the intervals. The shipped file was made by the first command from the table before it: the
-network of two tails, whose inputs changed, was learned anew, those of one tail and of three and more went on; lag,
-memory and rest are those that an earlier version learned.
+lookup` the coverage of the intervals. The shipped file was made by the second command, then by the third. In the
+second the network of two tails, whose inputs changed, was learned anew; those of one tail and of three and more
+went on.
 
 The tails are learned from robots with heads far wider than those of the domain; one and two tails also from robots
 of the domain, half of which have effects on head and motor; one tail also from 8192 robots with all these effects
 and a surface couple of −1.5 to 1.5. The local widths of the intervals are learned from robots of the domain, half
 of them with effects, and from robots with such a couple, half of them with one tail; the intervals are calibrated
-on robots drawn as users draw them. The response to a flip is learned from the sweep and from some of the wide
-robots, its spread over the disc's phase from robots with two tails. All robots are drawn from Sobol sequences with
-the seeds below. The test set led to no choice of any kind.
+on robots drawn as users draw them. The response to a flip is learned from robots of the domain with two tails and
+more, half of them with effects on the head. All robots are drawn from Sobol sequences with the seeds below. The
+test set led to no choice of any kind.
 
-Takes two and a half hours of two cores with its simulations.
+Takes three hours of two cores with its simulations.
 """
 
 from __future__ import annotations
@@ -34,7 +34,6 @@ import numpy as np
 
 from common.arrays import Floats
 from common.files import write_text
-from dataset.data_set import read_manifest
 from surrogate.domain import INSIDE, ROBOT
 from surrogate.held_out import curve_errors, error_table, relative_errors, summary
 from surrogate.table import NeuralTable
@@ -49,63 +48,47 @@ from surrogate.training.simulated import (
     draw_robots,
     join_robots,
     reached_columns,
-    read_robots,
     simulate_robots,
 )
 from surrogate.training.train import (
-    held_out_curve_errors,
     learn,
     recalibrated,
-    split,
     with_radius,
-    with_spread,
+    with_response,
+    with_response_errors,
     with_tails,
 )
 
 TAILS = Settings(width=64, depth=3, members=1, epochs=60, iterations=6000)
 FEW = replace(TAILS, iterations=12000)  # of one and two tails
-CURVES = Settings(width=64, depth=2, members=1, epochs=60, iterations=1500)
+CURVES = Settings(width=80, depth=2, members=1, epochs=60, iterations=4000)
 ROWS = {
     "tails": (98304, 101), "single": (16384, 505), "couples": (8192, 606), "pairs": (12288, 707),
     "widths": (8192, 202), "widths_couples": (6144, 911),
     "held_out": (8192, 402), "held_out_couples": (2048, 912),
     "locked": (4096, 20261201),
 }  # fmt: skip
-FLIPS = {
-    "flips": (1400, 301), "locked_flips": (400, 20261202),
-    "pair_flips": (12288, 1301), "wide_pair_flips": (8192, 1302),
-}  # fmt: skip
+FLIPS = {"flips": (49152, 1401), "locked_flips": (400, 20261202)}
 AS_USERS = {"calibration": (65536, 7001), "fresh": (65536, 8002)}
-_HALF_WITH_EFFECTS = ("single", "pairs", "widths", "held_out")
+_HALF_WITH_EFFECTS = ("single", "pairs", "widths", "held_out", "flips")
 _LEARNED = ("tails", "single", "couples", "pairs")
-_PAIR_FLIPS = ("pair_flips", "wide_pair_flips")
 _WIDTHS, _HELD_OUT = ("widths", "widths_couples"), ("held_out", "held_out_couples")
 _COUPLES = ("couples", "widths_couples", "held_out_couples")
 # share that gets one tail
 _SINGLE = {"single": 1.0, "couples": 1.0, "widths_couples": 0.5, "held_out_couples": 0.5}
 _STEADY_ONLY = ("surface_couple", "motor_droop")  # effects that the response to a flip is not learned with
-_SWEPT = 16384  # rows of the sweep without history whose lags are learned
 _DRAWN = 4  # times as many as are wanted for the errors of the response: some are outside the domain
-_FLIPS_DRAWN = 6400  # of this sequence, the first ones are simulated
 
 
 def robots(name: str) -> dict[str, Floats]:
     """Draw the robots of one set."""
-    if name in FLIPS:
-        count, seed = FLIPS[name]
-        if name in _PAIR_FLIPS:
-            drawn = draw_robots(count, seed, wide=name.startswith("wide")) | {"N": np.full(count, 2.0)}
-            return {n: values for n, values in drawn.items() if n not in _STEADY_ONLY}
-        if name != "flips":
-            return draw_robots(count, seed, wide=False)
-        tails = 1.0 + np.arange(_FLIPS_DRAWN) % 8
-        np.random.default_rng(seed).shuffle(tails)
-        every = {**draw_robots(_FLIPS_DRAWN, seed, wide=True), "N": tails}
-        return {n: np.asarray(values[:count]) for n, values in every.items() if n not in _STEADY_ONLY}
     if name in AS_USERS:
         return draw_as_users(*AS_USERS[name])
-    count, seed = ROWS[name]
-    drawn = draw_robots(count, seed, wide=name == "tails", effects=name != "locked")
+    count, seed = (ROWS | FLIPS)[name]
+    drawn = draw_robots(count, seed, wide=name == "tails", effects=not name.startswith("locked"))
+    if name == "flips":
+        drawn = {n: np.maximum(values, 2.0) if n == "N" else values for n, values in drawn.items()
+                 if n not in _STEADY_ONLY}  # fmt: skip
     if name in _HALF_WITH_EFFECTS:  # every second robot of a Sobol sequence has a small C_r
         without = np.random.default_rng((seed, 2)).uniform(size=count) < 0.5
         for effect in [n for n in drawn if n not in ROBOT]:
@@ -129,7 +112,8 @@ def kept(work: Path, name: str) -> SimulatedRobots:
     began = time.process_time()
     learned = name in _LEARNED or name in FLIPS
     make: Callable[..., SimulatedRobots] = simulate_robots if learned else as_reached
-    curves = {"curves": True, "history": name not in _PAIR_FLIPS} if name in FLIPS else {}
+    finer = {"tolerance": TOLERANCE} if name == "locked_flips" else {}
+    curves = {"curves": True, **finer} if name in FLIPS else {}
     rows = make(robots(name), title=name, **curves)
     print(f"{name}: {len(rows)} rows, {time.process_time() - began:.0f} s")
     work.mkdir(parents=True, exist_ok=True)
@@ -141,18 +125,6 @@ def kept(work: Path, name: str) -> SimulatedRobots:
 def _joined(work: Path, names: Sequence[str]) -> SimulatedRobots:
     """Join sets, see `kept`."""
     return join_robots([kept(work, name) for name in names])
-
-
-def swept(folder: str) -> tuple[SimulatedRobots, SimulatedRobots]:
-    """Read the rows of a sweep in two parts.
-
-    They are those to learn, with response curves (with memory and rest, and _SWEPT without), and those held out.
-    """
-    rows, numbers = read_robots(folder)
-    part, history = split(numbers), np.isfinite(rows.curves["rest"]).all((1, 2))
-    lags = np.flatnonzero((part == 0) & ~history & (rows.robots["N"] > 1))[:_SWEPT]
-    learned = np.union1d(lags, np.flatnonzero((part == 0) & history))
-    return rows.at(learned), rows.at(np.flatnonzero((part > 0) & history))
 
 
 def test(lookup: NeuralTable, rows: SimulatedRobots, flips: SimulatedRobots) -> None:
@@ -216,9 +188,7 @@ def with_intervals_of_users(lookup: NeuralTable, work: Path) -> NeuralTable:
     return replace(recalibrated(lookup, rows), provenance={**lookup.provenance, "intervals": source})
 
 
-def with_response_errors(
-    lookup: NeuralTable, *, count: int = 420, seed: int = 202, title: str = ""
-) -> NeuralTable:
+def judged_by_flips(lookup: NeuralTable, *, count: int = 840, seed: int = 202, title: str = "") -> NeuralTable:
     """Return a table with errors of its response learned from new robots; half a second of one core each.
 
     The curves of a data set are simulated with time steps that leave errors as large as the table's. These robots
@@ -237,11 +207,8 @@ def with_response_errors(
     chosen = {name: values[inside] for name, values in robots.items()}
     flips = simulate_robots(chosen, curves=True, tolerance=TOLERANCE, title=title)
     source = {"robots": len(flips), "seed": seed, "tolerance": TOLERANCE}
-    return replace(
-        lookup,
-        curve_errors=held_out_curve_errors(lookup, flips),
-        provenance={**lookup.provenance, "response_errors": source},
-    )
+    judged = with_response_errors(lookup, flips)
+    return replace(judged, provenance={**lookup.provenance, "response_errors": source})
 
 
 def as_reached(robots: Mapping[str, Floats], *, title: str = "") -> SimulatedRobots:
@@ -251,12 +218,31 @@ def as_reached(robots: Mapping[str, Floats], *, title: str = "") -> SimulatedRob
     return reached.at(np.asarray(columns["converged"], dtype=bool))
 
 
+def _trained(work: Path, tails: str | None, response: str | None) -> NeuralTable:
+    """Train a table, without the part that is kept of another one."""
+    context = TrainingContext("train", folder=work / "states")
+    if tails:
+        source = {"seeds": {"flips": FLIPS["flips"]}}
+        return with_response(load(tails), kept(work, "flips"), CURVES, source=source, context=context)
+    steady, widths, held_out = (_joined(work, names) for names in (_LEARNED, _WIDTHS, _HELD_OUT))
+    if response:
+        return with_tails(
+            load(response), steady, widths, held_out, TAILS,
+            few_settings=FEW, source={"seeds": ROWS}, context=context,
+        )  # fmt: skip
+    return learn(
+        steady, widths, held_out, kept(work, "flips"), TAILS, CURVES,
+        few_settings=FEW, source={"seeds": {**ROWS, **FLIPS}}, context=context,
+    )  # fmt: skip
+
+
 def main(*words: str) -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("work", type=Path)
     parser.add_argument("--out")
-    parser.add_argument("--sweep", help="data set built from surrogate/shipped/domain.toml")
-    parser.add_argument("--response", help="table whose response to a flip is kept, instead of a sweep")
+    kept_part = parser.add_mutually_exclusive_group()
+    kept_part.add_argument("--response", help="table whose response to a flip is kept")
+    kept_part.add_argument("--tails", help="table whose steady motions are kept")
     parser.add_argument("--calibrate", help="table whose intervals alone are learned anew")
     parser.add_argument("--test")
     parser.add_argument("--picture", help="with --test: draw the errors of the yaw rate of its robots")
@@ -266,27 +252,8 @@ def main(*words: str) -> None:
         lookup = with_intervals_of_users(load(arguments.calibrate), arguments.work)
         lookup.save(arguments.out or arguments.calibrate)
     elif arguments.out:
-        if bool(arguments.sweep) == bool(arguments.response):
-            parser.error("--out needs --sweep or --response")
-        steady, widths, held_out = (_joined(arguments.work, names) for names in (_LEARNED, _WIDTHS, _HELD_OUT))
-        context = TrainingContext("train", folder=arguments.work / "states")
-        if arguments.response:
-            lookup = with_tails(
-                load(arguments.response), steady, widths, held_out, TAILS,
-                few_settings=FEW, source={"seeds": ROWS}, context=context,
-            )  # fmt: skip
-        else:
-            flips = kept(arguments.work, "flips")
-            source = {"seeds": {**ROWS, **FLIPS}, "data_hash": read_manifest(arguments.sweep)["config_hash"]}
-            learned, swept_held_out = swept(arguments.sweep)
-            lookup = learn(
-                steady, widths, held_out, join_robots([flips, learned]), TAILS, CURVES,
-                few_settings=FEW, source=source, flips_held_out=swept_held_out, context=context,
-            )  # fmt: skip
-        pairs = _joined(arguments.work, _PAIR_FLIPS)
-        seeds = {name: FLIPS[name] for name in _PAIR_FLIPS}
-        lookup = with_spread(lookup, pairs, CURVES, source={"seeds": seeds}, context=context)
-        lookup = with_response_errors(lookup, title="errors of the response")
+        lookup = _trained(arguments.work, arguments.tails, arguments.response)
+        lookup = judged_by_flips(lookup, title="errors of the response")
         lookup = with_intervals_of_users(lookup, arguments.work)
         lookup.save(arguments.out)
         remove_states(arguments.work / "states")

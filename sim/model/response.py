@@ -10,7 +10,9 @@ and the lag stops changing after about two time units. Three things change it:
     memory   after a dwell that was too short for the tails to turn over, this is added to the lag. What came
              before that dwell hardly matters (below 1e-4 l and rad where no dwell is shorter than 0.3)
     rest     the lag of the first dwell of all, from straight tails at rest
-    spread   the phase of the disc at the flip is unknown: curves are means over it, and this is their deviation
+    spread   the phase of the disc at the flip is unknown: curves are means over it, and this is the deviation of a
+             lag from the mean pose of a turn before the flip to that of a turn after it. How the head wobbles in a
+             turn comes and goes; what is left adds up over the flips
 
 Equal dwells of T make the net speed v̄ = |p + Rot(Δψ) M p| / 2T with g = (p, Δψ) and M the mirror image. Curves of
 a reversed motor are seen as for a positive one. Units: l, μ0 l⁴/EI. `sim.motion.response` simulates these curves;
@@ -30,7 +32,6 @@ BEFORE = np.geomspace(0.2, 1.2, 16)  # T̄ of the dwell before
 FORGOTTEN = 1.4  # T̄ of the dwell before from which on the response is that after a long one
 LAG_PARTS = ("z", "x", "psi_rad")  # of a lag: forward, to the side of the new turn, heading
 LAGS = tuple(f"lag_{part}" for part in LAG_PARTS)  # columns
-_NEAR = 1.5  # ratio of dwells over which a spread is averaged
 SETTLED = 2.0  # time units after a flip from which the lag is constant
 
 
@@ -47,20 +48,6 @@ class Responses:
     failed: Flags  # (B,)
     stepped: Flags  # (B,): by time steps
     before: Floats = field(default_factory=BEFORE.copy)  # (K,), T̄ of the dwell before, of `memory`
-
-
-def typical_spread(spread: Floats, dwells: Floats = DWELLS) -> Floats:
-    """Return the root mean square of spreads (..., D, 3) over dwells up to 1.5 times as long or as short.
-
-    The lag depends on the disc's phase at the end of a dwell, too. So the spread rises and falls with the dwell,
-    at N times the spin of the disc, with two tails up to ten times. Curves at D dwells cannot follow that. Dwells
-    after SETTLED are as the last ones before.
-    """
-    sampled = np.arange(len(dwells)) <= np.searchsorted(dwells, SETTLED)
-    centres = np.clip(dwells, _NEAR * dwells[0], SETTLED / _NEAR)
-    apart = np.abs(np.log(np.minimum(dwells, SETTLED) / centres[:, None]))
-    near = (apart <= np.log(_NEAR) * (1 + 1e-9)) & sampled
-    return np.asarray(np.sqrt(np.einsum("ij,...jk->...ik", near / near.sum(1, keepdims=True), spread**2)))
 
 
 def at_equal_dwells(memory: Floats, knots: Floats = BEFORE, dwells: Floats = DWELLS) -> Floats:

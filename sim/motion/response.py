@@ -22,16 +22,20 @@ from sim.model.response import BEFORE, DWELLS, SETTLED, Responses
 from sim.motion.steady import steady
 from sim.motion.steady_motion import Steady, net_speeds, twists
 from sim.motion.stepped_response import Curves, stepped_response
-from sim.solve.assembly import bodies, numbers
+from sim.solve.assembly import batch, bodies, numbers
 from sim.solve.grouping import slices
 from sim.solve.march import REVERSED
+from sim.solve.phase import at_instants, lags_by_phase
 from sim.solve.refinement import OnMesh, coarse_orbits, orbits_on_mesh
 from sim.solve.transient import Flip, follow_flips
 
 _SAME = 1.2  # time units from which the memory is constant
 MESHES = (6, 9)  # edges
 TOLERANCE = 1e-3  # of a time step, in l: see `sim.solve.transient`
-_LEAST_INSTANTS = {1: 3, 2: 3}  # by N; with more tails the phase at the flip hardly matters
+_LEAST_INSTANTS = {1: 3, 2: 5}  # by N; with more tails the phase at the flip hardly matters
+_KICK = 0.6  # time units after a flip in which its phase acts on the robot's way
+_KICK_TIMES = np.geomspace(4e-3, _KICK, 60)
+_KICK_TOLERANCE = 1e-4  # of a time step, in l
 _OFFSET = 1  # of a robot's numbers
 
 
@@ -123,15 +127,25 @@ def _on_meshes(
     """Simulate the curves of B robots on each mesh, with memory and rest where `history` says so."""
     after = orbits_with_phases(rows, wanted.tails, meshes)
     if wanted.even:
-        starts = [[orbit and orbit._replace(x=mirrored(orbit.x)) for orbit in mesh] for mesh in after]
+        starts = [
+            [orbit and orbit._replace(x=mirrored(orbit.x), u=orbit.u[-np.arange(len(orbit.u))]) for orbit in mesh]
+            for mesh in after
+        ]
     else:
         instants = [[len(orbit.u) if orbit else 1 for orbit in mesh] for mesh in after]
         turned = orbits_with_phases(reverse_rows, wanted.tails, meshes, instants)
         starts = [[orbit and orbit._replace(u=orbit.u * REVERSED) for orbit in mesh] for mesh in turned]
-    return [
+    curves = [
         _on_mesh(rows, reverse_rows, after[mesh], starts[mesh], wanted, history[mesh])
         for mesh in range(len(meshes))
     ]
+    if wanted.tails in _LEAST_INSTANTS:
+        spreads = _spreads(rows, reverse_rows, after[0], starts[0], wanted)
+        curves[-1] = [
+            one and (None if spread is None else one._replace(spread=spread))
+            for one, spread in zip(curves[-1], spreads, strict=True)
+        ]
+    return curves
 
 
 def orbits_with_phases(
@@ -191,8 +205,38 @@ def _on_mesh(
             curves.append(None)
         else:
             lag = course.lag[wanted.until(SETTLED)]
-            curves.append(Curves(lag.mean(1), *past, lag.std(1)))
+            curves.append(Curves(lag.mean(1), *past, np.zeros_like(rest)))
     return curves
+
+
+def _spreads(
+    rows: Floats,
+    reverse_rows: Floats,
+    after: Sequence[OnMesh | None],
+    starts: Sequence[OnMesh | None],
+    wanted: _Wanted,
+) -> list[Floats | None]:
+    """Compute standard deviations (D, 3) of the lags of B robots over the phase of the disc at the flip.
+
+    Args:
+        after, starts: see `_on_mesh`; their instants are all phases of a flip.
+    """
+    flips = [
+        Flip(row, start.x, start.u, orbit.twist, _KICK) if orbit and start else None
+        for row, orbit, start in zip(rows, after, starts, strict=True)
+    ]
+    times, place = np.unique(np.minimum(wanted.dwells, _KICK), return_inverse=True)
+    spreads: list[Floats | None] = []
+    for i, course in enumerate(follow_flips(flips, _KICK_TIMES, _KICK_TOLERANCE)):
+        start, orbit = starts[i], after[i]
+        if course is None or start is None or orbit is None:
+            spreads.append(None)
+            continue
+        before = at_instants(batch(reverse_rows[i : i + 1]), start.u * REVERSED)
+        swum = at_instants(batch(rows[i : i + 1]), course.velocities)
+        lags = lags_by_phase(before, _KICK_TIMES, course.lag[0], swum, wanted.tails, orbit.twist, times)
+        spreads.append(lags.std(0)[place])
+    return spreads
 
 
 def _flips_back(

@@ -5,9 +5,9 @@ g = λ ∘ c. It stops changing where the motion is steady:
 
     λ_ψ' = ω_yr − ω*_yr,   (λ_z, λ_x)' = Rot(ψ)(v − v*) + λ_ψ' J Rot(λ_ψ) c
 
-Where a turn has an odd number of instants, λ is a function of the disc's phase φ, too: its mean and spread over φ
-are those of robots whose phase at the jump is unknown. Where the number is even, only the mean over a turn is
-followed. Units: l, μ0 l⁴/EI.
+Where a turn has an odd number of instants, λ is a function of the disc's phase φ, too: its mean over φ is that of
+robots whose phase at the jump is unknown. What the phase adds is damped by long time steps, see `sim.solve.phase`.
+Where the number is even, only the mean over a turn is followed. Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations

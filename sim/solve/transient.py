@@ -38,7 +38,7 @@ from sim.solve.march import GAMMA
 from sim.solve.newton import Workspace, correct, largest_move, move, new_workspace
 from sim.solve.rates import Rates, in_transient
 
-_MOST_STEPS = 400
+_MOST_STEPS = 2000
 _CORRECTION = 1e-3  # of a node, in l: Newton's method stops below it
 _MOST_CORRECTIONS = 8
 _OSCILLATION = 0.1  # weight of what averages out over a turn in the error of a step
@@ -62,6 +62,7 @@ class Course(NamedTuple):
     """What a robot does after a jump; or B robots, in arrays (B, …)."""
 
     lag: Floats  # (T, Q, 3): (Δz, Δx, Δψ), Q phases, or one entry for the mean over a turn; NaN after its end
+    velocities: Floats  # (T, P, 4)
     shapes: Floats  # at the marks, (K, n, M, 3)
     end: Floats  # shape at the end, (n, M, 3)
     solved: Any
@@ -154,6 +155,7 @@ def _follow(flips: Flip, names: Any, marks: Floats, times: Floats, tolerance: fl
     )  # fmt: skip
     found = Course(
         np.full((robots, len(times), fields, 3), np.nan),
+        np.full((robots, len(times), flips.u.shape[1], 4), np.nan),
         np.full((robots, len(marks), n, columns, 3), np.nan),
         np.full(flips.x.shape, np.nan),
         np.zeros(robots, np.bool_),
@@ -321,7 +323,7 @@ def _record(
     i: int, progress: _Progress, at: _State, new: _State, new_rate: Floats, now: Any, new_now: Any, marks: Floats,
     times: Floats, found: Course,
 ) -> None:  # fmt: skip
-    """Keep the lags that lie in an accepted step of lane i, and the shape if the step ends at a mark."""
+    """Keep lags and velocities that lie in an accepted step of lane i, and the shape if it ends at a mark."""
     robot, begin, end = progress.robot[i], lane(now, i), lane(new_now, i)
     while progress.steps[i] > 1 and progress.places[i] < len(times) and times[progress.places[i]] <= end:
         index = progress.places[i]
@@ -332,6 +334,10 @@ def _record(
                     share, end - begin, lane(at.lag[p, c], i), lane(new.lag[p, c], i),
                     lane(at.lag_rate[p, c], i), lane(new_rate[p, c], i),
                 )  # fmt: skip
+        for p in range(new.u.shape[0]):
+            for c in range(4):
+                first, last = lane(at.u[p, c], i), lane(new.u[p, c], i)
+                found.velocities[robot, index, p, c] = first + share * (last - first)
         progress.places[i] += 1
     if progress.marks[i] < len(marks) and end == marks[progress.marks[i]]:
         take_lane(found.shapes[robot, progress.marks[i]], new.x, i)

@@ -22,7 +22,6 @@ import torch
 from torch import Tensor
 
 from common.arrays import Flags, Floats, Integers
-from sim.model.response import typical_spread
 from surrogate.motions import CLASSES, INPUT_COUNTS, WrenchTable, network_index
 from surrogate.network import Ensemble
 from surrogate.response import PARTS, SHAPES, Basis, ResponseTable, along_axes, encoded_spread, flip_inputs
@@ -48,7 +47,7 @@ _SMOOTHNESS = {len(some): some for some in (SINGLE_SMOOTHNESS, PAIR_SMOOTHNESS, 
 _FURTHER = 3  # part of the iterations with which a trained network goes on
 _OUTLIER = 10.0  # rows that weigh more than this many times the median weigh only so much
 _GAP = Settings(width=24, depth=2, members=1, epochs=60, iterations=200)
-_COMPONENTS = 32  # of each kind of curve
+_COMPONENTS = {"lag": 32, "memory": 32, "rest": 32, "spread": 8}
 CURVES = Settings(width=48, depth=2, members=2, epochs=200, iterations=150)
 _SMOOTH = 2.0  # standard deviations over which the components change
 
@@ -160,7 +159,8 @@ def fit_response(
     rows: WrenchSamples, curves: Mapping[str, Floats], settings: Settings, context: TrainingContext
 ) -> ResponseTable:
     """Fit a table to curves of robots, by name as in SHAPES, each (M, …, 3); NaN where one was not simulated."""
-    parts = [fit_part(names, rows, curves, settings, context) for names in PARTS]
+    rough = replace(settings, width=settings.width // 2)  # enough for a spread
+    parts = [fit_part(names, rows, curves, rough if "spread" in names else settings, context) for names in PARTS]
     bases = {name: basis for _, of_part in parts for name, basis in of_part.items()}
     return ResponseTable(tuple(network for network, _ in parts), bases)
 
@@ -182,8 +182,8 @@ def fit_part(
     for name in names:
         scaled = (curves[name][known] / along_axes(speeds[known], SHAPES[name])).reshape(known.sum(), -1)
         if name == "spread":
-            scaled = encoded_spread(typical_spread(scaled.reshape(-1, *SHAPES[name])))
-        bases[name] = _basis(scaled, _COMPONENTS)
+            scaled = encoded_spread(scaled.reshape(-1, *SHAPES[name]))
+        bases[name] = _basis(scaled, _COMPONENTS[name])
         targets.append((scaled - bases[name].mean) @ bases[name].vectors.T)
         weights += [(3 / np.prod(SHAPES[name])) ** 0.5] * len(bases[name].vectors)
     wanted, inputs = np.concatenate(targets, -1), inputs[known]

@@ -26,13 +26,12 @@ from surrogate.error_modes import KINDS, CurveErrors
 from surrogate.held_out import curve_errors, relative_errors, summary
 from surrogate.intervals import Intervals
 from surrogate.motions import WrenchTable, network_index
-from surrogate.response import PARTS, SHAPES, ResponseTable, along_axes, flip_inputs
+from surrogate.response import PARTS, SHAPES, along_axes, flip_inputs
 from surrogate.table import NeuralTable
 from surrogate.tails import network_inputs
 from surrogate.training.fits import (
     CURVES,
     WrenchSamples,
-    fit_part,
     fit_response,
     fit_wrench,
     learnable,
@@ -44,7 +43,7 @@ from surrogate.training.simulated import SimulatedRobots, join_robots, read_robo
 _MIN_INSIDE = 10
 _MIN_FLIPS = 200  # robots, for the covariance of the errors of the response
 _MIN_ROWS, _MIN_OF_A_CLASS = 64, 16
-_OF_RESPONSE = ("code_version", "data_hash", "spread")  # what the provenance of a table says of its response
+_OF_RESPONSE = ("code_version", "data_hash")  # what the provenance of a table says of its response
 _QUIET = TrainingContext()
 
 
@@ -218,7 +217,7 @@ def with_tails(
     return _with_intervals(again, width_rows, held_out)
 
 
-def with_spread(
+def with_response(
     lookup: NeuralTable,
     flipped: SimulatedRobots,
     settings: Settings,
@@ -226,21 +225,24 @@ def with_spread(
     source: dict[str, Any] | None = None,
     context: TrainingContext = _QUIET,
 ) -> NeuralTable:
-    """Return a table whose spread of the lag over the disc's phase is learned anew.
+    """Return a table with its response to a flip learned anew; its steady motions stay.
 
     Args:
         lookup: the table.
-        flipped: robots with two tails, with lag and spread.
-        settings: of the network.
+        flipped: robots with response curves.
+        settings: of the networks.
         source: where the robots come from, for the provenance.
         context: as for `learn`.
     """
-    rows, usable = _learnable(flipped)
-    network, bases = fit_part(("spread",), rows, flipped.at(usable).curves, settings, context.part("spread"))
-    curves = ResponseTable((*lookup.curves.networks[:-1], network), {**lookup.curves.bases, **bases})
-    learned_first = lookup.provenance.get("response", {})
-    response = {**learned_first, "spread": {**(source or {}), "rows": len(rows.motion)}}
-    return replace(lookup, curves=curves, provenance={**lookup.provenance, "response": response})
+    rows, usable = _learnable(flipped := _several_tails(flipped))
+    curves = fit_response(rows, flipped.at(usable).curves, settings, replace(context, networks=len(PARTS)))
+    old = lookup.provenance
+    config = {**old["config"], "curves": asdict(settings)}
+    response = {"code_version": provenance({})["code_version"], **(source or {})}
+    rows_of = {**old["rows"], "flips": len(rows.motion)}
+    return replace(
+        lookup, curves=curves, provenance={**old, "config": config, "response": response, "rows": rows_of}
+    )
 
 
 def _created(
@@ -267,21 +269,20 @@ def _judged(
     lookup: NeuralTable, width_rows: SimulatedRobots, held_out: SimulatedRobots, flips: SimulatedRobots
 ) -> NeuralTable:
     """Add intervals and held-out errors to a table."""
-    lookup = _with_intervals(lookup, width_rows, held_out)
+    return with_response_errors(_with_intervals(lookup, width_rows, held_out), flips)
+
+
+def with_response_errors(lookup: NeuralTable, flips: SimulatedRobots) -> NeuralTable:
+    """Return a table with the errors of its response to robots with curves that it did not learn."""
     flips = flips.at(np.abs(flips.motion["omega_yr_bar"]) < MAX_YAW_SHARE * np.abs(flips.motion["omega_t_bar"]))
     response = lookup.response(flips.robots, flag=True)
     truth = {**flips.motion, **flips.curves}
     report = summary(curve_errors(response, truth), flips.motion["tail_gap"] >= 1)
-    return replace(lookup, errors={**lookup.errors, **report}, curve_errors=held_out_curve_errors(lookup, flips))
+    return replace(lookup, errors={**lookup.errors, **report}, curve_errors=_curve_errors(lookup, flips))
 
 
-def held_out_curve_errors(lookup: NeuralTable, flips: SimulatedRobots) -> CurveErrors | None:
-    """Learn the errors of the response from robots that were not learned; None where they are too few.
-
-    Args:
-        lookup: the table.
-        flips: held-out robots with curves.
-    """
+def _curve_errors(lookup: NeuralTable, flips: SimulatedRobots) -> CurveErrors | None:
+    """Learn the errors of the response from robots that were not learned; None where they are too few."""
     motions = lookup.solve(flips.robots)
     known = (motions.outside == INSIDE) & (flips.motion["tail_gap"] >= 1)
     if known.sum() < _MIN_FLIPS:

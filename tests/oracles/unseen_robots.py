@@ -18,9 +18,8 @@ from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.vehicle import Rollout, Switches, roll_out
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
-from sim.motion.response import responses
 from surrogate.table import NeuralTable
-from surrogate.tabulate import TOLERANCE, tabulate
+from surrogate.tabulate import tabulate
 
 LONG = 150.0  # l, from which a path is a long one
 
@@ -131,17 +130,9 @@ def carried(seed: int, lookup: NeuralTable) -> Carried:
     tracked = result.tracked._replace(vehicle=table_vehicle(robot, own))
     errors = plan_errors(tracked, result.drawn, result.declared, result.switches, guaranteed=None, seed=0)
     rollout = roll_out(tracked.vehicle, result.switches, tracked.offset)
-    varying = tracked._replace(vehicle=table_vehicle(robot, replace(own, spread=_spread(robot))))
-    track = rollout.track + _of_a_phase(rng, varying, result.switches, rollout)
+    track = rollout.track + _of_a_phase(rng, tracked, result.switches, rollout)
     found = predicted_error(result.reference, track, closed=result.drawn.closed).largest
     return Carried(kind, result, errors.stated, found + WOBBLE)
-
-
-def _spread(robot: Robot) -> list[list[list[float]]]:
-    """Simulate the spread of a robot (2, D, 3) at each dwell, which a table averages over dwells."""
-    group = robot.groups()
-    sides = [responses(side, history=False, tolerance=TOLERANCE) for side in (group, group.reversed())]
-    return [side.spread[0].tolist() for side in sides]
 
 
 def _of_a_phase(rng: np.random.Generator, tracked: TrackedVehicle, switches: Switches, rollout: Rollout) -> Floats:
