@@ -128,7 +128,8 @@ def test_a_response_is_learned_apart_from_the_tails() -> None:
     found = again.response(held.robots, flag=True)
     two, turned = held.robots["N"] == 2, held.curves["lag"][:, -1, 2]
     assert np.median(np.abs(found.lag[:, -1, 2] / turned - 1)) < 0.3
-    assert np.median(np.abs(np.log(found.spread / held.curves["spread"])[two, 12:, 2])) < 0.5
+    spread, true = (curves[two, 12:, 2] for curves in (found.spread, held.curves["spread"]))
+    assert np.median(np.abs(np.log(spread / true))) < 0.5
     assert not found.spread[~two].any()
 
 
