@@ -122,8 +122,8 @@ def test_every_place_is_on_the_declared_path() -> None:
 def test_the_error_of_the_tour_itself_decides_its_dwell() -> None:
     """A longer one than the objective begins with: its flips, which are fewer, add up to less."""
     fixed, best = (tour(PLACES, tracked(), dwell=dwell) for dwell in (0.81, None))
-    assert best.minimum_dwell > 1.5 * fixed.minimum_dwell
-    assert best.stated_error < 0.8 * fixed.stated_error
+    assert best.minimum_dwell > 1.2 * fixed.minimum_dwell
+    assert best.stated_error < fixed.stated_error
 
 
 @pytest.mark.parametrize("size", [1.0, 0.4])
