@@ -2,7 +2,8 @@
 
 From the steady motion in the opposite direction: one flip, and poses after every dwell. The state at the end is
 steady in the new direction. From there two flips, a short dwell apart, give the response after a short dwell.
-Curves are means over two phases of the disc, half a tail spacing apart, and their spread is that of the two.
+Curves are means over two phases of the disc, half a tail spacing apart, and their spread is that of the two, with
+the wobble of a turn.
 """
 
 from __future__ import annotations
