@@ -12,7 +12,9 @@ and the lag stops changing after about two time units. Three things change it:
     rest     the lag of the first dwell of all, from straight tails at rest
     spread   the phase of the disc at the flip is unknown: curves are means over it, and this is the deviation of a
              lag from the mean pose of a turn before the flip to that of a turn after it. How the head wobbles in a
-             turn comes and goes; what is left adds up over the flips
+             turn comes and goes; what is left adds up over the flips. A single tail turns the head by so much in a
+             turn that where the first one begins matters more; its deviation is that from pose to pose, of all
+             dwells together
 
 Equal dwells of T make the net speed v̄ = |p + Rot(Δψ) M p| / 2T with g = (p, Δψ) and M the mirror image. Curves of
 a reversed motor are seen as for a positive one. Units: l, μ0 l⁴/EI. `sim.motion.response` simulates these curves;

@@ -139,7 +139,7 @@ def _on_meshes(
         _on_mesh(rows, reverse_rows, after[mesh], starts[mesh], wanted, history[mesh])
         for mesh in range(len(meshes))
     ]
-    if wanted.tails in _LEAST_INSTANTS:
+    if wanted.tails == 2:
         spreads = _spreads(rows, reverse_rows, after[0], starts[0], wanted)
         curves[-1] = [
             one and (None if spread is None else one._replace(spread=spread))
@@ -205,7 +205,9 @@ def _on_mesh(
             curves.append(None)
         else:
             lag = course.lag[wanted.until(SETTLED)]
-            curves.append(Curves(lag.mean(1), *past, np.zeros_like(rest)))
+            # One tail's spread rises and falls with the dwell, faster than the curve can follow.
+            spread = np.broadcast_to(np.sqrt(lag.var(1).mean(0)), rest.shape)
+            curves.append(Curves(lag.mean(1), *past, spread))
     return curves
 
 
