@@ -123,7 +123,9 @@ def main(count: str = "60", first: str = "9000", replays: str = "10", file: str 
             print(line(name, some, lambda one: one.own))
     simulated = [one for one in plans if np.isfinite(one.replayed)]
     if simulated:
-        print(line("replayed in time steps", simulated, lambda one: one.replayed))
+        for name, some in classes(simulated):
+            if some:
+                print(line(f"replayed in time steps: {name}", some, lambda one: one.replayed))
         print(f"the simulator's own error of a track: {np.median([one.replay_error for one in simulated]):.4f} l "
               f"at the median, {max(one.replay_error for one in simulated):.4f} l at most")  # fmt: skip
     for one in sorted((one for one in plans if one.own > one.stated), key=lambda one: one.seed):

@@ -187,10 +187,7 @@ def _on_mesh(
         after: steady motions after the flip.
         starts: steady shapes before the flip, with the velocities right after it.
     """
-    flips = [
-        Flip(row, start.x, start.u, orbit.twist, SETTLED) if orbit and start else None
-        for row, orbit, start in zip(rows, after, starts, strict=True)
-    ]
+    flips = _flips(rows, after, starts, SETTLED)
     courses = follow_flips(flips, wanted.times, wanted.tolerance)
     rest = np.zeros((len(wanted.dwells), 3))
     pasts: list[tuple[Floats, Floats] | None]
@@ -211,6 +208,16 @@ def _on_mesh(
     return curves
 
 
+def _flips(
+    rows: Floats, after: Sequence[OnMesh | None], starts: Sequence[OnMesh | None], until: float
+) -> list[Flip | None]:
+    """Flip from the steady motions before; arguments as in `_on_mesh`, and the time to follow."""
+    return [
+        Flip(row, start.x, start.u, orbit.twist, until) if orbit and start else None
+        for row, orbit, start in zip(rows, after, starts, strict=True)
+    ]
+
+
 def _spreads(
     rows: Floats,
     reverse_rows: Floats,
@@ -223,10 +230,7 @@ def _spreads(
     Args:
         after, starts: see `_on_mesh`; their instants are all phases of a flip.
     """
-    flips = [
-        Flip(row, start.x, start.u, orbit.twist, _KICK) if orbit and start else None
-        for row, orbit, start in zip(rows, after, starts, strict=True)
-    ]
+    flips = _flips(rows, after, starts, _KICK)
     times, place = np.unique(np.minimum(wanted.dwells, _KICK), return_inverse=True)
     spreads: list[Floats | None] = []
     for i, course in enumerate(follow_flips(flips, _KICK_TIMES, _KICK_TOLERANCE)):
