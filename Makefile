@@ -9,7 +9,7 @@ SOURCES := $(wildcard sim/*.py sim/*/*.py)
 # of wheels that pip knows is handed on.
 LINKS = $(or $(PIP_FIND_LINKS),$(shell $(PYTHON) -m pip config get global.find-links 2>/dev/null))
 UV = $(if $(LINKS),UV_FIND_LINKS="$(LINKS)") UV_SYSTEM_CERTS=1 $(VENV)/bin/uv
-INSTALL = $(UV) pip install --quiet --compile-bytecode --python $(RUN) --constraints constraints.txt --build-constraints constraints.txt
+INSTALL = $(UV) pip install --quiet --python $(RUN) --constraints constraints.txt --build-constraints constraints.txt
 
 CONFIG ?=
 DATA ?= data/sweep

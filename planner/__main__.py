@@ -130,7 +130,7 @@ def _page(write_page: Call, *, out: str) -> None:
 
 @program.command("compile")
 def _compile() -> None:
-    """Compile the loops of queries and plans now rather than on first use."""
+    """Compile the loops of queries, plans and training now rather than on first use."""
     from time import perf_counter
 
     import numpy as np
@@ -140,12 +140,16 @@ def _compile() -> None:
     from sim import jit
     from sim.inputs import group_columns
     from sim.model.presets import PRESETS
+    from surrogate.domain import Support
+    from surrogate.intervals import Intervals
     from surrogate.table_file import load
 
     jit.beforehand, began = True, perf_counter()
     robot, table = group_columns([PRESETS["paper-control"]]), load()
     table.query({**robot, "dwell_bar": np.ones(1)}, intervals=True)
     plan(circle(2.0), PRESETS["paper-control"])
+    Support.learned(np.eye(2))
+    Intervals.learned(np.eye(2), {})
     print(f"loops compiled in {perf_counter() - began:.0f} s -> {jit.CACHE}")
 
 

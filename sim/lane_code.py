@@ -237,17 +237,13 @@ def _width(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return context.get_constant(types.int64, plain.width())
 
 
-def _vectors(array: Any, width: Any = None) -> Any:
-    count = plain.width() if width is None else len(width)
-    kind = types.float64 if count == 1 else Lanes(count)
-    return types.Array(kind, array.ndim - 1, "C", aligned=count == 1)(
-        *([array] if width is None else [array, width])
-    )
+def _vectors(array: Any) -> Any:
+    return types.Array(Lanes(plain.width()), array.ndim - 1, "C", aligned=False)(array)
 
 
 @_teach(plain.lanes, _vectors)
 def _view(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    """View numbers (…, W) as vectors (…), or as numbers if W = 1."""
+    """View numbers (…, W) as vectors (…)."""
     kind = sig.return_type
     numbers = make_array(sig.args[0])(context, builder, args[0])
     vectors = make_array(kind)(context, builder)
@@ -256,7 +252,7 @@ def _view(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         data=builder.bitcast(numbers.data, context.get_data_type(kind.dtype).as_pointer()),
         shape=unpack_tuple(builder, numbers.shape)[:-1],
         strides=unpack_tuple(builder, numbers.strides)[:-1],
-        itemsize=context.get_constant(types.intp, 8 * getattr(kind.dtype, "width", 1)),
+        itemsize=context.get_constant(types.intp, 8 * kind.dtype.width),
         meminfo=numbers.meminfo,
         parent=numbers.parent,
     )

@@ -1,7 +1,7 @@
 """Numbers of several robots at once: each number of a formula is a vector with one lane for each robot.
 
-A compiled loop works on arrays of vectors with W lanes, a group of W robots, or of plain numbers, a robot alone
-(W = 1). Vectors are added, multiplied and compared like numbers; so a formula for one robot is one for a group as
+A compiled loop works on arrays of vectors with W lanes, a group of W robots; a robot alone is in the first lane of
+a group. Vectors are added, multiplied and compared like numbers; so a formula for one robot is one for a group as
 well. In the products of one robot's matrices the lanes are columns (`columns`). A lane never sees another lane. So
 the result of a robot depends neither on its neighbours in a group nor on W: operations are those of IEEE 754, in
 the order of the source, and products are only fused where the source says so (`fma`). Such loops are compiled by
@@ -10,7 +10,7 @@ the order of the source, and products are only fused where the source says so (`
 A condition on lanes is a vector of 1 (true) and 0 (false), by which `choose` picks.
 
 The functions of this file are for compiled loops. `sim.lane_code` gives their machine code; what stands here is
-what they do to plain numbers. `width_for` chooses W.
+what they do to plain numbers.
 """
 
 from __future__ import annotations
@@ -32,16 +32,8 @@ def width() -> int:
     return 8 if wide else 4
 
 
-def width_for(robots: int) -> tuple[int, ...]:
-    """Return a tuple of length W for a number of robots: a robot alone is computed with plain numbers, W = 1."""
-    return (0,) * (1 if robots == 1 else width())
-
-
-def lanes(array: Any, width: Any = None) -> Any:
-    """View an array of numbers (…, W) as an array (…) of vectors, or of plain numbers if W = 1.
-
-    `width` is a tuple of length W, which is then part of its type; W is that of this processor by default.
-    """
+def lanes(array: Any) -> Any:
+    """View an array of numbers (…, W) as an array (…) of vectors."""
     raise TypeError("lanes are for compiled loops alone")
 
 

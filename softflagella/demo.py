@@ -8,14 +8,17 @@ from __future__ import annotations
 import os
 import shlex
 import shutil
-import subprocess
 import sys
 import time
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from dataclasses import replace
-from itertools import chain
+from io import StringIO
+from multiprocessing import get_context
 from pathlib import Path
+from runpy import run_module
 
 import numpy as np
 
@@ -84,17 +87,33 @@ def run_steps(chains: Sequence[Sequence[Step]], folder: Path) -> list[Done]:
     Raises:
         InputError: a command fails.
     """
-
-    def run(steps: Sequence[Step]) -> list[Done]:
-        return [_run_step(step, folder) for step in steps]
-
-    done, bar = list[Done](), progress_bar("demo", total=sum(map(len, chains)), unit="step")
-    with bar as shown, ThreadPoolExecutor(available_jobs()) as pool:
-        for steps in chain([run(chains[0])], pool.map(run, chains[1:])):
-            done += steps
-            shown.update(len(steps))
-            shown.write("\n".join(line for step in steps for line in step.lines()))
+    os.environ.setdefault("OMP_NUM_THREADS", "1")  # in each process
+    first, *others = chains
+    # A process runs one command after another, so it imports once. The chain of most commands takes longest.
+    with (
+        progress_bar("demo", total=sum(map(len, chains)), unit="step") as shown,
+        ProcessPoolExecutor(available_jobs(), get_context("forkserver")) as pool,
+    ):
+        running = {0: pool.submit(_run_chain, first, folder)}
+        running[0].result()
+        for place in sorted(range(len(others)), key=lambda i: -sum(len(step.commands) for step in others[i])):
+            running[1 + place] = pool.submit(_run_chain, others[place], folder)
+        done = list[Done]()
+        try:
+            for place in range(len(chains)):
+                steps = running[place].result()
+                done += steps
+                shown.update(len(steps))
+                shown.write("\n".join(line for step in steps for line in step.lines()))
+        except BrokenProcessPool:
+            raise InputError("a process of the demo was killed; perhaps the machine ran out of memory") from None
+        finally:
+            pool.shutdown(cancel_futures=True)
     return done
+
+
+def _run_chain(steps: Sequence[Step], folder: Path) -> list[Done]:
+    return [_run_step(step, folder) for step in steps]
 
 
 def _run_step(step: Step, folder: Path) -> Done:
@@ -104,14 +123,16 @@ def _run_step(step: Step, folder: Path) -> Done:
 
 
 def _run(words: str, folder: Path) -> str:
-    """Run a command of softflagella in a folder, and return what it prints."""
-    known = [str(Path(__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])]
-    done = subprocess.run(
-        [sys.executable, "-m", "softflagella", *shlex.split(words)], cwd=folder, text=True, capture_output=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(known), "OMP_NUM_THREADS": "1"},
-    )  # fmt: skip
-    if done.returncode:
-        raise InputError(
-            f"softflagella {words}: {done.stderr.strip().rpartition('error: ')[2] or done.returncode}"
-        )
-    return done.stdout
+    """Run a command as `python -m softflagella` does, in a folder, and return what it prints."""
+    printed, complaint = StringIO(), StringIO()
+    with chdir(folder), redirect_stdout(printed), redirect_stderr(complaint):
+        given, sys.argv = sys.argv, ["softflagella", *shlex.split(words)]
+        try:
+            run_module("softflagella", run_name="__main__")
+        except SystemExit as end:
+            if end.code:
+                refusal = complaint.getvalue().strip().rpartition("error: ")[2] or end.code
+                raise InputError(f"softflagella {words}: {refusal}") from None
+        finally:
+            sys.argv = given
+    return printed.getvalue()

@@ -170,7 +170,7 @@ CHAINS = (
             (
                 f"sweep --config {shlex.quote(str(SWEEP_TOML))} --out sweep",
                 "dataset report sweep --out sweep.html",
-                "train sweep --out model.safetensors --epochs 60",
+                "train sweep --out model.safetensors --epochs 40",
                 "surrogate errors",
             ),
             {

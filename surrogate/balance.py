@@ -12,6 +12,7 @@ import numpy as np
 
 from common.arrays import Flags, Floats
 from sim.jit import compiled_fast
+from sim.linear.lane_arrays import copy
 from surrogate.network import BLOCK, Layers, evaluate
 from surrogate.tails import (
     PAIR_INPUTS,
@@ -55,7 +56,7 @@ def network_inputs_at(robot: Floats, motion: Floats, x: Floats) -> None:
     if len(x) == _SINGLE:
         perp, offset, radius = robot[PLACES.perp], robot[PLACES.offset], robot[PLACES.radius]
         x[0], x[1], x[2], x[3] = inputs_of_single(perp, offset, radius, robot[PLACES.spin_drag], motion[4])
-        x[4:] = robot[PLACES.head]
+        copy(x[4:], robot[PLACES.head])
     elif len(x) == _PAIR:
         for i, value in enumerate(inputs_of_pair(_inputs(robot, motion), robot[PLACES.head])):
             x[i] = value
@@ -123,7 +124,8 @@ def _first_guess(robot: Floats, motion: Floats, rows: Floats) -> None:
     equations[2, 0] -= number * perp / 2
     equations[1, 3] += number * (perp - parallel) * spin * a**2 * linear_thrust(perp * spin)
     _eliminate(equations)
-    motion[:3] = equations[:, 3]
+    for i in range(3):
+        motion[i] = equations[i, 3]
 
 
 @compiled_fast
@@ -134,7 +136,7 @@ def _first_inverse(robot: Floats, motion: Floats, y: Floats, left: Floats, inver
         largest = max(largest, abs(motion[j]))
     for j in range(4):
         width = DIFFERENCE * (abs(motion[j]) + MIN_SHARE * largest)
-        moved[:] = motion
+        copy(moved, motion)
         moved[j] += width
         moved[4] = robot[PLACES.speed] + robot[PLACES.gain] * moved[3]
         _residual(robot, moved, y, after)
@@ -142,7 +144,8 @@ def _first_inverse(robot: Floats, motion: Floats, y: Floats, left: Floats, inver
             rows[i, j] = (after[i] - left[i]) / width
             rows[i, 4 + j] = 1.0 if i == j else 0.0
     _eliminate(rows)
-    inverse[:] = rows[:, 4:]
+    for i in range(4):
+        copy(inverse[i], rows[i, 4:])
 
 
 @compiled_fast
@@ -198,7 +201,7 @@ def _solve(network: Layers, robots: Floats, motion: Floats, found: Flags) -> Non
                 network_inputs_at(robots[row], motion[row], x[k])
             evaluate(network, x[: len(block)], y[: len(block)])
             for k, row in enumerate(block):
-                before[:] = left[row]
+                copy(before, left[row])
                 _residual(robots[row], motion[row], y[k], left[row])
                 if turn == 0:
                     _first_inverse(robots[row], motion[row], y[k], left[row], inverse[row], room)

@@ -87,8 +87,8 @@ class Intervals:
     ) -> tuple[Floats, Floats, Integers]:
         """Return ends (O, M) and groups (M,), see `intervals_of`."""
         own = np.zeros((len(features), ROBOT_NUMBERS)) if robots is None else robots
-        arguments: Any = (*self._stacked, kinds, places, np.ascontiguousarray(features), own, outputs)
-        return intervals_of(*arguments)
+        numbers: Any = map(np.ascontiguousarray, (features, own, outputs))  # one type of array, compiled once
+        return intervals_of(*self._stacked, kinds, places, *numbers)
 
     @cached_property
     def _stacked(self) -> Any:

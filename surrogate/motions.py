@@ -13,6 +13,7 @@ import numpy as np
 
 from common.arrays import Floats, Integers
 from sim.jit import compiled_fast
+from sim.linear.lane_arrays import copy
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.balance import inputs_at, network_inputs_at, solve
 from surrogate.domain import FAST_YAW, INSIDE, MAX_YAW_SHARE, NO_MOTION, NOVEL, SupportNumbers, put_novelty
@@ -95,13 +96,14 @@ def motions_of(
             robot = robots[begin + k]
             network_inputs_at(robot, motion[begin + k], own[k])
             inputs_at(robot, motion[begin + k], inputs[begin + k])
-            of_gap[k, :7], of_gap[k, 7] = inputs[begin + k], np.log(robot[PLACES.number])
+            copy(of_gap[k, :7], inputs[begin + k])
+            of_gap[k, 7] = np.log(robot[PLACES.number])
         put_novelty(support, own[: end - begin], novelty)
         evaluate(gap, of_gap[: end - begin], share[: end - begin])
         for k in range(end - begin):
             row = begin + k
             _put_outputs(robots[row], motion[row], share[k, 0], outputs[:, row])
-            features[row, :_INPUTS] = inputs[row]
+            copy(features[row, :_INPUTS], inputs[row])
             features[row, _INPUTS], features[row, SPREAD] = np.log(novelty[k] + 1e-12), np.log(TINY_SPREAD)
             features[row, SPREAD + 1], features[row, SPREAD + 2] = of_gap[k, 7], 1.0 if of_gap[k, 7] == 0 else 0.0
             for i in range(FEATURES):

@@ -21,6 +21,7 @@ import numpy as np
 
 from common.arrays import Floats
 from sim.jit import compiled_fast
+from sim.linear.lane_arrays import copy
 
 BLOCK = 64  # robots that are evaluated together
 SHARED = ("shift", "scale", "mean", "spread")  # what the members have in common
@@ -186,8 +187,9 @@ def evaluate(layers: Layers, x: Floats, y: Floats) -> None:
     hidden, following = np.empty((count, width + inputs)), np.empty((count, width + inputs))
     own = np.empty_like(y)
     shifted = x - layers.shift  # here, since a scale may be small: an input that was learned with one value
-    hidden[:, width:] = shifted
-    following[:, width:] = shifted
+    for row in range(count):
+        copy(hidden[row, width:], shifted[row])
+        copy(following[row, width:], shifted[row])
     y[:] = 0.0
     for k in range(members):
         product(layers.first[k], layers.biases[k, 0], shifted, hidden, False)

@@ -28,6 +28,7 @@ import numpy as np
 
 from common.arrays import Floats, Integers
 from sim.jit import compiled_fast
+from sim.linear.lane_arrays import copy
 from sim.mechanics.planar import zigzag_speed
 from sim.model.response import BEFORE, DWELLS, at_equal_dwells
 from sim.motion.steady_motion import STEADY_OUTPUTS
@@ -132,7 +133,8 @@ def along_axes(speeds: Floats, shape: tuple[int, ...]) -> Floats:
 def _put_flip_inputs(robot: Floats, motion: Floats, inputs: Floats, x: Floats, speeds: Floats) -> None:
     """Write the inputs of the networks of a flip (15,), and what their curves are multiplied by (3,)."""
     head, number = robot[PLACES.head], robot[PLACES.number]
-    x[:_INPUTS] = inputs
+    for i in range(_INPUTS):
+        x[i] = inputs[i]
     for i, index in enumerate(OF_HEAD):
         x[_INPUTS + i] = head[index]
     x[FLIP_INPUTS - 2], x[FLIP_INPUTS - 1] = np.log(number), 1.0 if number == 2 else 0.0
@@ -187,7 +189,7 @@ def write_flips(
             place = min(np.log(dwells[row]), knots[-1])
             first = min(max(np.searchsorted(knots, place) - 2, 0), len(knots) - 4)
             # Only the four knots about the dwell are needed of a curve: 12 numbers of 75.
-            near[:] = mean[3 * first : 3 * first + 12]
+            copy(near, mean[3 * first : 3 * first + 12])
             for c in range(len(vectors)):
                 size = of_lag[k, c] if c < components else of_memory[k, c - components]
                 for i in range(12):

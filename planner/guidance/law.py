@@ -419,7 +419,8 @@ def follow_dwells(
             pose = pose_after(law, pose, sense, before, flip.time)
             state = integrate(law, state, pose, sense)
             dwells[done] = flip.time
-            poses[done] = pose
+            for i, value in enumerate(pose):
+                poses[done, i] = value
             done, sense, before = done + 1, -sense, flip.time
         if flip.ended:
             return FollowState(pose, sense, before, state, furthest, stalled, done, True, False)

@@ -131,7 +131,8 @@ def _place_tail(
     first_clamp = n * ((len(scene.by) - _SEGMENTS) // (n + 1))
     place = _in_body(motion, (body.offset, 0.0, 0.0))
     put_at(scene.place, j * (n + 1), place)
-    scene.of[j * (n + 1) : (j + 1) * (n + 1)] = j
+    for k in range(n + 1):
+        scene.of[j * (n + 1) + k] = j
     for k in range(n):
         force = times(0.5 * cell if k == n - 1 else cell, motion.load)
         force = minus(force, vector(geometry.force, k, column))

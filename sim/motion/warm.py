@@ -1,7 +1,6 @@
 """Compile all kernels of the simulator, with progress, so that the first use need not wait for it.
 
-Orbits have loops for groups of robots and for one alone. Two processes compile, where there are two processors:
-one what groups need, the other what one robot needs and flips.
+Two processes compile, where there are two processors: one the loops of orbits, the other those of motion in time.
 """
 
 from __future__ import annotations
@@ -16,14 +15,12 @@ from pathlib import Path
 import numpy as np
 
 from sim import jit
-from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.motion.response import responses
 from sim.motion.sensitivity import sensitivities
 from sim.motion.settling import settle
 from sim.motion.steady import steady
-from sim.solve.assembly import bodies, numbers
-from sim.solve.march import Marcher, equal_steps, new_state, side_by_side
+from sim.solve.assembly import numbers
 from sim.solve.orbit import straight_starts
 from sim.solve.transient import Flip, follow_flips
 from sim.threads import available_jobs
@@ -39,25 +36,12 @@ def _flip() -> None:
     follow_flips([Flip(rows[0], x, u, np.zeros(3), 1e-3)], np.array([1e-3]), 1e-3)
 
 
-def _of_orbits(groups: Groups, whose: str) -> tuple[Stage, ...]:
-    """Return what compiles the loops of orbits."""
-    return (
-        (f"orbits of {whose}", lambda: steady(groups, stability=False)),
-        (f"stability of {whose}", lambda: steady(groups)),
-        (f"derivatives of {whose}", lambda: sensitivities(groups, ("C_t",))),
-    )
-
-
-def _swim_side_by_side() -> None:
-    body, steps = bodies(_ROBOT)[0], equal_steps(0.1, 2)
-    side_by_side([Marcher(body, body, new_state(_ROBOT.N, 8, body.offset), steps) for _ in range(2)])
-
-
-_OF_GROUPS = (
-    *_of_orbits(_ROBOT.select(np.array([0, 0])), "groups"),
-    ("time steps of groups", _swim_side_by_side),
+_OF_ORBITS: tuple[Stage, ...] = (
+    ("orbits", lambda: steady(_ROBOT, stability=False)),
+    ("stability", lambda: steady(_ROBOT)),
+    ("derivatives", lambda: sensitivities(_ROBOT, ("C_t",))),
 )
-_OF_ONE = (("flips", _flip), ("time steps", lambda: settle(_ROBOT)), *_of_orbits(_ROBOT, "one robot"))
+_IN_TIME: tuple[Stage, ...] = (("flips", _flip), ("time steps", lambda: settle(_ROBOT)))
 
 
 @cache
@@ -81,9 +65,9 @@ def _compile(stages: tuple[Stage, ...]) -> None:
         print(f"compiled {stage[0]}, {time.perf_counter() - began:.0f} s", file=sys.stderr, flush=True)
 
 
-def compile_for_one() -> None:
-    """Compile what one robot needs, and flips, in a process of its own."""
-    _compile(_OF_ONE)
+def compile_in_time() -> None:
+    """Compile the loops of motion in time, in a process of its own."""
+    _compile(_IN_TIME)
 
 
 def compile_all() -> float:
@@ -94,17 +78,17 @@ def compile_all() -> float:
     """
     began = time.perf_counter()
     if available_jobs() > 1 and not all_compiled():
-        code = f"import sys; sys.path[:] = {sys.path!r}; import {__name__} as warm; warm.compile_for_one()"
+        code = f"import sys; sys.path[:] = {sys.path!r}; import {__name__} as warm; warm.compile_in_time()"
         other = subprocess.Popen([sys.executable, "-c", code])
         try:
-            _compile(_OF_GROUPS)
+            _compile(_OF_ORBITS)
             other.wait()
         finally:
             other.kill()
-        for _, call in _OF_ONE:  # what the other process has compiled is read here
+        for _, call in _IN_TIME:  # what the other process has compiled is read here
             call()
     else:
-        _compile(_OF_GROUPS + _OF_ONE)
+        _compile(_OF_ORBITS + _IN_TIME)
     responses(_ROBOT)
     _mark().touch()
     return time.perf_counter() - began

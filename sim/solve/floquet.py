@@ -52,9 +52,8 @@ def arnoldi(
         by_phase: d/dφ, (M, M).
         first: a unit vector, (3 n M,).
     """
-    width = robots.width
-    shapes, velocities = lanes(x, width), lanes(u, width)
-    shift, out = lanes(shifts, width), lanes(projected, width)
+    shapes, velocities = lanes(x), lanes(u)
+    shift, out = lanes(shifts), lanes(projected)
     count = out.shape[2]
     basis = zeros(shapes, (count + 1, first.size))
     image, du = zeros(shapes, shapes[0].shape), zeros(shapes, velocities[0].shape)

@@ -1,7 +1,7 @@
 """How robots share groups with a robot in each lane (`sim.lanes`): arrays (B, …) of B robots, (G, …, W) in lanes.
 
-A group is W robots, one in each lane; a robot alone is a group of its own, with W = 1. Empty lanes repeat the last
-robot, and nothing is asked of them. In compiled loops the numbers of a group are one `Body`.
+A group is W robots, one in each lane. Empty lanes repeat the last robot, and nothing is asked of them. In compiled
+loops the numbers of a group are one `Body`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 from common.arrays import Flags, Floats
 from sim.jit import borrowing, compiled
-from sim.lanes import lane, lanes, less, tuple_like, width_for
+from sim.lanes import lane, lanes, less, tuple_like, width
 from sim.linear.lane_arrays import take_lane
 from sim.model.body import PLACES, SHAPES, SINGLE, Body
 from sim.solve.assembly import Nonlocal
@@ -38,18 +38,14 @@ def by_kind(robots: Iterable[int], kind: Callable[[int], object]) -> list[list[i
 
 def in_groups(array: Floats) -> Floats:
     """Lay out an array (B, …) of B ≥ 1 robots as (G, …, W)."""
-    count, width = len(array), len(width_for(len(array)))
-    if width == 1:
-        return np.array(array[..., None], order="C")
-    groups = -(-count // width)
-    places = np.minimum(np.arange(groups * width), count - 1)
-    return np.ascontiguousarray(np.moveaxis(array[places].reshape(groups, width, *array.shape[1:]), 1, -1))
+    count, lanes_each = len(array), width()
+    groups = -(-count // lanes_each)
+    places = np.minimum(np.arange(groups * lanes_each), count - 1)
+    return np.ascontiguousarray(np.moveaxis(array[places].reshape(groups, lanes_each, *array.shape[1:]), 1, -1))
 
 
 def from_groups(array: Floats, count: int) -> Floats:
     """Lay out an array (G, …, W) as (B, …), for B robots."""
-    if array.shape[-1] == 1:
-        return array[..., 0]
     robots = np.moveaxis(array, -1, 1)
     return np.ascontiguousarray(robots.reshape(-1, *robots.shape[2:])[:count])
 
@@ -60,20 +56,19 @@ class InLanes(NamedTuple):
     numbers: Floats  # in the order of `Body`, (G, K, W)
     wanted: Floats  # 1 in the lanes of robots that are wanted, else 0, (G, W)
     names: Any  # numbers of the non-local effects of any robot; only their names matter
-    width: tuple[int, ...]  # of length W
 
 
 def robots_in_lanes(rows: Floats, wanted: Flags | None = None) -> InLanes:
     """Lay out robots with numbers (B, K) in groups; flags (B,) tell which are wanted, all by default."""
     flags = in_groups(np.ones(len(rows)) if wanted is None else wanted.astype(float))
     flags.reshape(-1)[len(rows) :] = 0.0
-    return InLanes(in_groups(rows), flags, NAMES, width_for(len(rows)))
+    return InLanes(in_groups(rows), flags, NAMES)
 
 
 @compiled
 def group_of(robots: InLanes, g: int) -> tuple[Body, Any]:
     """Return the robots of group g as one, and 1 in the lanes of those that are wanted."""
-    numbers, wanted = lanes(robots.numbers, robots.width), lanes(robots.wanted, robots.width)
+    numbers, wanted = lanes(robots.numbers), lanes(robots.wanted)
     return body_of_numbers(numbers[g], robots.names), wanted[g]
 
 

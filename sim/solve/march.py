@@ -1,5 +1,4 @@
-"""Implicit time steps at constant motor speed, in the disc frame, for a robot in each lane (`sim.lanes`)
-or for one alone.
+"""Implicit time steps at constant motor speed, in the disc frame, for a robot in each lane (`sim.lanes`).
 
 Positions are in the disc frame, in which the shape is almost steady at constant motor speed. Every stage solves
 the balance with x = x* + τ ẋ, φ = φ* + τ ω_t by Newton's method (`sim.solve.newton`). One or two corrections are
@@ -28,7 +27,7 @@ import numpy as np
 
 from common.arrays import Floats, Integers
 from sim.jit import borrowing, compiled
-from sim.lanes import choose, lane, lanes, larger, less, somewhere, width_for, with_lane, zeros
+from sim.lanes import choose, lane, lanes, larger, less, somewhere, width, with_lane, zeros
 from sim.linear.lane_arrays import add_chosen, choose_all, largest_entry, take_lane
 from sim.mechanics.balance import tail_spin
 from sim.mechanics.geometry import straight
@@ -89,7 +88,7 @@ class _Written(NamedTuple):
 
 @compiled
 def _march(
-    numbers: Floats, names: Any, w: Any, given: State, steps: Steps, counts: Integers, tolerance: float,
+    numbers: Floats, names: Any, given: State, steps: Steps, counts: Integers, tolerance: float,
     record: _Written,
 ) -> None:  # fmt: skip
     """Make the steps of the robots of one group, each in its lane; arrays end with (W,).
@@ -97,15 +96,14 @@ def _march(
     Args:
         numbers: of the robots, and with their motors reversed, (2, K, W).
         names: of the non-local effects.
-        w: a tuple of length W.
         given: where they start, changed.
         steps: (T, W).
         counts: how many of the steps each lane makes, (W,).
         tolerance: on the last correction.
         record: filled.
     """
-    own, other = lanes(numbers, w)[0], lanes(numbers, w)[1]
-    state = State(lanes(given.x, w), lanes(given.x_dot, w), lanes(given.pose, w), lanes(given.u, w))
+    own, other = lanes(numbers)[0], lanes(numbers)[1]
+    state = State(lanes(given.x), lanes(given.x_dot), lanes(given.pose), lanes(given.u))
     star, now, before = _new_like(state), _new_like(state), _new_like(state)
     u = state.u.reshape((1, 4))
     dx, du = zeros(state.x, state.x.shape), zeros(u, u.shape)
@@ -113,15 +111,15 @@ def _march(
     body, limit = body_of_numbers(own, names), largest_move(body_of_numbers(own, names))
     none = 0.0 * state.pose[0]
     going, begins, dt, anew, second, corrections = none, none, none + 1.0, none, none, none
-    slots = np.zeros(len(w), np.int64)
-    for i in range(len(w)):
+    slots = np.zeros(width(), np.int64)
+    for i in range(width()):
         going = with_lane(going, i, 1.0 if counts[i] > 0 else 0.0)
     begins, tau = going, dt
     while somewhere(going):
         # A lane whose stage converged starts its next one; it waits for no other.
         if somewhere(begins):
             starts, flips = begins * (1 - second), none
-            for i in range(len(w)):
+            for i in range(width()):
                 if lane(starts, i) != 0:
                     at = record.done[i]
                     dt, anew = with_lane(dt, i, steps.lengths[at, i]), with_lane(anew, i, steps.anew[at, i])
@@ -149,7 +147,7 @@ def _march(
             _end_stage(body, state, star, tau, ends)
             # A first stage of SDIRK2 ends no step: its second stage begins.
             second, ends = choose(ends, anew * (1 - second), second), ends * (1 - anew * (1 - second))
-        for i in range(len(w)):
+        for i in range(width()):
             if lane(ends, i) != 0:
                 at = record.done[i]
                 take_lane(record.poses[i, at], state.pose, i)
@@ -258,7 +256,7 @@ def joined(parts: Sequence[Steps]) -> Steps:
 
 def side_by_side(swims: Sequence[Marcher], tolerance: float = TOLERANCE) -> list[Marched]:
     """Let at most W robots with equal numbers of tails and edges make their time steps side by side."""
-    w, counts = width_for(len(swims)), [len(swim.steps.lengths) for swim in swims]
+    counts = [len(swim.steps.lengths) for swim in swims]
     wrong = [~((swim.steps.lengths > 0) & (swim.steps.lengths < np.inf)) for swim in swims]
     able = [int(np.argmax(bad)) if bad.any() else count for bad, count in zip(wrong, counts, strict=True)]
     steps = [
@@ -267,12 +265,12 @@ def side_by_side(swims: Sequence[Marcher], tolerance: float = TOLERANCE) -> list
     ]
     states = State(*(in_groups(np.array(part))[0] for part in zip(*(swim.state for swim in swims), strict=True)))
     slots = [int(swim.steps.kept.sum()) for swim in swims]
-    kept = State(*(np.empty((len(w), max(slots), *part.shape[:-1])) for part in states))
-    record = _Written(np.zeros(len(w), int), np.full((len(w), max(counts), 6), np.nan), kept)
+    kept = State(*(np.empty((width(), max(slots), *part.shape[:-1])) for part in states))
+    record = _Written(np.zeros(width(), int), np.full((width(), max(counts), 6), np.nan), kept)
     numbers = in_groups(np.array([np.concatenate([row(swim.body), row(swim.reverse)]) for swim in swims]))[0]
-    asked = np.zeros(len(w), int)
+    asked = np.zeros(width(), int)
     asked[: len(able)] = able
-    _march(numbers, NAMES, w, states, Steps(*steps), asked, tolerance, record)
+    _march(numbers, NAMES, states, Steps(*steps), asked, tolerance, record)
     found = []
     for i, swim in enumerate(swims):
         for part, end in zip(swim.state, states, strict=True):

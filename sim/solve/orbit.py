@@ -131,8 +131,7 @@ def smallest_gaps(rows: Floats, x: Floats, tails: int) -> Floats:
 @compiled
 def _solve_groups(robots: InLanes, x: Floats, u: Floats, tolerance: float, sizes: Floats) -> None:
     """Improve x (G, n, M, 3, W) and u (G, P, 4, W) in place; `sizes` (G, W) of the last corrections are filled."""
-    width = robots.width
-    shapes, velocities, size = lanes(x, width), lanes(u, width), lanes(sizes, width)
+    shapes, velocities, size = lanes(x), lanes(u), lanes(sizes)
     rates = on_orbit(shapes[0])
     work = new_workspace(rates, shapes[0], velocities[0])
     for g in range(len(size)):
@@ -143,8 +142,8 @@ def _solve_groups(robots: InLanes, x: Floats, u: Floats, tolerance: float, sizes
 @compiled
 def _fill_residuals(robots: InLanes, x: Floats, u: Floats, r: Floats, t: Floats, force: Floats) -> None:
     """Fill r (G, n, M, 3, W), t (G, P, 4, W) and force (G, W) at x and u, see `residuals_on_orbits`."""
-    shapes, velocities = lanes(x, robots.width), lanes(u, robots.width)
-    on_nodes, on_robots, largest = lanes(r, robots.width), lanes(t, robots.width), lanes(force, robots.width)
+    shapes, velocities = lanes(x), lanes(u)
+    on_nodes, on_robots, largest = lanes(r), lanes(t), lanes(force)
     rates, scratch = on_orbit(shapes[0]), new_scratch(shapes[0], velocities[0])
     for g in range(len(largest)):
         body, where = group_of(robots, g)
@@ -156,8 +155,8 @@ def _fill_residuals(robots: InLanes, x: Floats, u: Floats, r: Floats, t: Floats,
 @compiled
 def _solve_linear_in_groups(robots: InLanes, x: Floats, u: Floats, dx: Floats, du: Floats) -> None:
     """Solve in place for the right-hand sides dx (G, K, n, M, 3, W), du (G, K, P, 4, W) at x and u."""
-    shapes, velocities = lanes(x, robots.width), lanes(u, robots.width)
-    changes, changes_of_robot = lanes(dx, robots.width), lanes(du, robots.width)
+    shapes, velocities = lanes(x), lanes(u)
+    changes, changes_of_robot = lanes(dx), lanes(du)
     rates = on_orbit(shapes[0])
     work = new_workspace(rates, shapes[0], velocities[0])
     for g in range(len(shapes)):

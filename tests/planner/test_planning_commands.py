@@ -256,24 +256,33 @@ def test_another_robot_carries_out_a_plan_and_its_tracking_error_is_told(tmp_pat
 
 
 _COMPILED = """
-import sys
+import shlex, sys
 from softflagella.__main__ import main
 from sim.jit import Loop
 def loops():
     modules = list(sys.modules.values())
     known = {each for module in modules for each in vars(module).values() if isinstance(each, Loop)}
     return {(each.__name__, types) for each in known if "kernel" in vars(each) for types in each.kernel.signatures}
-main(["planner", "compile"])
+for words in sys.argv[1:-1]:
+    main(shlex.split(words))
 before = loops()
-main(["plan", "circle:2l", "--robot", "paper-control", "--feedback", "--out", sys.argv[1]])
+main(shlex.split(sys.argv[-1]))
 assert before and loops() == before, loops() - before
 """
 
 
-def test_a_plan_needs_no_loops_but_those_that_are_compiled_beforehand(tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", _COMPILED, str(tmp_path)], capture_output=True, text=True, timeout=LIMIT
-    )
+@pytest.mark.parametrize(
+    ("first", "words"),
+    [
+        ([], "plan circle:2l --robot paper-control --feedback --out plan"),
+        (["sweep --rows 96 --out sweep --jobs 1"], "train sweep --out model.safetensors --epochs 1"),
+    ],
+)
+def test_commands_need_no_loops_but_those_that_are_compiled_beforehand(
+    first: list[str], words: str, tmp_path: Path
+) -> None:
+    command = [sys.executable, "-c", _COMPILED, "sim compile", "planner compile", *first, words]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
 
 

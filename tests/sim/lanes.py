@@ -8,7 +8,7 @@ import numpy as np
 
 from common.arrays import Floats
 from sim.jit import compiled
-from sim.lanes import lanes
+from sim.lanes import lanes, width
 from sim.linear.chains import Chains
 from sim.model.body import Body
 from sim.solve.assembly import row
@@ -46,14 +46,14 @@ def _fill(
     robots: InLanes, by_phase: Floats, pair: Floats, start: Floats, x: Floats, u: Floats, noise: float, r: Floats,
     t: Floats,
 ) -> None:  # fmt: skip
-    v, at_x, at_u = lanes(pair, robots.width), lanes(x, robots.width), lanes(u, robots.width)
-    rates = Rates(v[0], v[1], by_phase, lanes(start, robots.width))
+    v, at_x, at_u = lanes(pair), lanes(x), lanes(u)
+    rates = Rates(v[0], v[1], by_phase, lanes(start))
     scratch = new_scratch(at_x, at_u)
     for values in (scratch.around.flow, scratch.around.drag, scratch.x_dot, scratch.by_spin):
         values[:] = noise
     scratch.around.moment[:], scratch.around.wrench[:] = noise, noise
     body, wanted = group_of(robots, 0)
-    fill_residual(body, rates, at_x, at_u, wanted, scratch, lanes(r, robots.width), lanes(t, robots.width))
+    fill_residual(body, rates, at_x, at_u, wanted, scratch, lanes(r), lanes(t))
 
 
 class NewtonEquations(NamedTuple):
@@ -84,8 +84,8 @@ def _linear(
     robots: InLanes, by_phase: Floats, pair: Floats, start: Floats, x: Floats, u: Floats, dx: Floats, du: Floats,
     chains: Chains, resistance: Floats, r: Floats, t: Floats,
 ) -> None:  # fmt: skip
-    v, at_x, at_u = lanes(pair, robots.width), lanes(x, robots.width), lanes(u, robots.width)
-    rates = Rates(v[0], v[1], by_phase, lanes(start, robots.width))
+    v, at_x, at_u = lanes(pair), lanes(x), lanes(u)
+    rates = Rates(v[0], v[1], by_phase, lanes(start))
     body, work = group_of(robots, 0)[0], new_workspace(rates, at_x, at_u)
     linearise(body, rates, at_x, at_u, work.scratch, work.equations)
     found = work.equations.chains
@@ -94,16 +94,16 @@ def _linear(
         (chains.lower2, found.lower2), (chains.upper2, found.upper2), (chains.border, found.border),
         (chains.foot, found.foot), (resistance, work.equations.resistance),
     ):  # fmt: skip
-        lanes(out, robots.width)[:] = block
-    lanes(chains.corner, robots.width)[:] = found.corner
-    lanes(r, robots.width)[:], lanes(t, robots.width)[:] = work.equations.r, work.equations.t
-    factor_and_solve(body, rates, at_u, work, lanes(dx, robots.width), lanes(du, robots.width))
+        lanes(out)[:] = block
+    lanes(chains.corner)[:] = found.corner
+    lanes(r)[:], lanes(t)[:] = work.equations.r, work.equations.t
+    factor_and_solve(body, rates, at_u, work, lanes(dx), lanes(du))
 
 
 def corrections(body: Body, rates: Plain, x: Floats, u: Floats, tolerance: float) -> tuple[int, float]:
     """Improve x (n, M, 3) and u (P, 4) in place; return the number of corrections and the size of the last one."""
     pair, start, at_x, at_u = _stacked([rates.rate, rates.phase], rates.start, x, u)
-    robots, sizes = robots_in_lanes(row(body)), np.empty((1, 1))
+    robots, sizes = robots_in_lanes(row(body)), np.empty((1, width()))
     count = _newton(robots, rates.differentiation, pair, start, at_x, at_u, tolerance, sizes)
     x[:], u[:] = at_x[..., 0], at_u[..., 0]
     return int(count), float(sizes[0, 0])
@@ -114,9 +114,9 @@ def _newton(
     robots: InLanes, by_phase: Floats, pair: Floats, start: Floats, x: Floats, u: Floats, tolerance: float,
     sizes: Floats,
 ) -> int:  # fmt: skip
-    v, at_x, at_u = lanes(pair, robots.width), lanes(x, robots.width), lanes(u, robots.width)
-    rates = Rates(v[0], v[1], by_phase, lanes(start, robots.width))
+    v, at_x, at_u = lanes(pair), lanes(x), lanes(u)
+    rates = Rates(v[0], v[1], by_phase, lanes(start))
     body, going = group_of(robots, 0)
     count, size = newton(body, rates, at_x, at_u, new_workspace(rates, at_x, at_u), tolerance, going)
-    lanes(sizes, robots.width)[0] = size
+    lanes(sizes)[0] = size
     return count
