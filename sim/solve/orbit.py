@@ -125,7 +125,8 @@ def smallest_gaps(rows: Floats, x: Floats, tails: int) -> Floats:
     fine = with_phases(x, 2 * x.shape[-2])
     count, n, phases, _ = fine.shape
     shapes = np.ascontiguousarray(np.moveaxis(fine.reshape(count, n, tails, phases // tails, 3), 3, 1))
-    return tail_contact.smallest_gaps(shapes, rows[:, PLACES.offset], rows[:, PLACES.tail_radius])
+    offset, radius = np.ascontiguousarray(rows[:, [PLACES.offset, PLACES.tail_radius]].T)
+    return tail_contact.smallest_gaps(shapes, offset, radius)
 
 
 @compiled

@@ -275,6 +275,7 @@ assert before and loops() == before, loops() - before
     ("first", "words"),
     [
         ([], "plan circle:2l --robot paper-control --feedback --out plan"),
+        (["steady paper-control"], "steady paper-control --vary motor.speed_rpm=20,40,60 --plot motion.png"),
         (["sweep --rows 96 --out sweep --jobs 1"], "train sweep --out model.safetensors --epochs 1"),
     ],
 )
