@@ -9,6 +9,7 @@ kept. Machine code runs with the user's rights: a folder must belong to the user
 from __future__ import annotations
 
 import errno
+import gc
 import os
 import sys
 from collections.abc import Callable, Iterable
@@ -27,6 +28,7 @@ SOURCES = ("jit.py", "lane*.py", "model/body.py", "linear/*.py", "mechanics/*.py
 _HERE = Path(__file__).parent
 _KEPT = 3  # folders of other versions
 _LEVEL = 1  # of optimisation: as fast as level 3, compiled in less than half the time
+_SELDOM = (100_000, 50, 100)  # new objects, and collections, before the next collection
 _COUNTED = {"_nrt": True}  # references to arrays, by which numba frees them
 _OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, **_COUNTED}
 _FAST = {"contract", "reassoc", "nsz", "arcp"}  # what fast sums and products may do; NaN keeps its meaning
@@ -154,21 +156,26 @@ def _numba() -> Any:
         raise OSError(errno.ENOTSUP, "loops need numba's compiler; unset it", "NUMBA_DISABLE_JIT")
 
     class Listener(event.Listener):
-        """Sets the level of optimisation while loops are compiled, and says once that they are."""
+        """Sets the level of optimisation while loops are compiled, and says once that they are.
+
+        Meanwhile Python seeks cycles among its objects less often, since numba makes millions that stay.
+        """
 
         def __init__(self) -> None:
-            self.levels: list[Any] = []
+            self.before: list[Any] = []
 
         def on_start(self, event: Any) -> None:
             if event.data["dispatcher"].py_func in _functions:
                 if not beforehand:
                     _say_first_use(event.data["dispatcher"].py_func.__module__.partition(".")[0])
-                self.levels.append(config.OPT)
+                self.before.append((config.OPT, gc.get_threshold()))
                 config.OPT = type(config.OPT)(_LEVEL)
+                gc.set_threshold(*_SELDOM)
 
         def on_end(self, event: Any) -> None:
             if event.data["dispatcher"].py_func in _functions:
-                config.OPT = self.levels.pop()
+                config.OPT, thresholds = self.before.pop()
+                gc.set_threshold(*thresholds)
 
     event.register("numba:compile", Listener())  # type: ignore[no-untyped-call]
     typeof_impl.register(Loop)(lambda loop, _: numba.types.Dispatcher(loop.part))

@@ -148,8 +148,8 @@ def _place_tail(
         add_at(scene.force, i, force)
         if k < n - 1:
             put_at(scene.force, i + 1, force)
-    scene.start[first_clamp + j] = scene.start[j * n]
-    scene.end[first_clamp + j] = scene.end[j * n]
+    put_at(scene.start, first_clamp + j, vector_at(scene.start, j * n))
+    put_at(scene.end, first_clamp + j, vector_at(scene.end, j * n))
     scene.by[first_clamp + j] = j
 
 

@@ -1,15 +1,16 @@
 """Compile all kernels of the simulator, with progress, so that the first use need not wait for it.
 
-Two processes compile, where there are two processors: one the loops of orbits, the other those of motion in time.
+Two processes compile, where there are two processors. The second is a copy of the first that has the balance of
+forces already: one goes on with the loops of orbits, the other with those of motion in time.
 """
 
 from __future__ import annotations
 
-import subprocess
 import sys
 import time
 from collections.abc import Callable
 from functools import cache
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,7 @@ from sim.motion.sensitivity import sensitivities
 from sim.motion.settling import settle
 from sim.motion.steady import steady
 from sim.solve.assembly import numbers
-from sim.solve.orbit import straight_starts
+from sim.solve.orbit import residuals_on_orbits, straight_starts
 from sim.solve.transient import Flip, follow_flips
 from sim.threads import available_jobs
 
@@ -29,13 +30,20 @@ _ROBOT = PRESETS["paper-control"].groups()
 Stage = tuple[str, Callable[[], object]]
 
 
-def _flip() -> None:
+def _balance() -> object:
+    """Compute what forces on straight tails leave unbalanced."""
+    rows = numbers(_ROBOT)
+    return residuals_on_orbits(rows, *straight_starts(rows, 4, 3 * _ROBOT.N, _ROBOT.N))
+
+
+def _flip() -> object:
     """Follow straight tails for a moment."""
     rows = numbers(_ROBOT)
     (x,), (u,) = straight_starts(rows, 4, 3 * _ROBOT.N, _ROBOT.N)
-    follow_flips([Flip(rows[0], x, u, np.zeros(3), 1e-3)], np.array([1e-3]), 1e-3)
+    return follow_flips([Flip(rows[0], x, u, np.zeros(3), 1e-3)], np.array([1e-3]), 1e-3)
 
 
+_FIRST: tuple[Stage, ...] = (("balance of forces", _balance),)
 _OF_ORBITS: tuple[Stage, ...] = (
     ("orbits", lambda: steady(_ROBOT, stability=False)),
     ("stability", lambda: steady(_ROBOT)),
@@ -65,11 +73,6 @@ def _compile(stages: tuple[Stage, ...]) -> None:
         print(f"compiled {stage[0]}, {time.perf_counter() - began:.0f} s", file=sys.stderr, flush=True)
 
 
-def compile_in_time() -> None:
-    """Compile the loops of motion in time, in a process of its own."""
-    _compile(_IN_TIME)
-
-
 def compile_all() -> float:
     """Call every kernel once, with progress on stderr. Kernels that are compiled already are only loaded.
 
@@ -77,12 +80,13 @@ def compile_all() -> float:
         The time that it took, in seconds.
     """
     began = time.perf_counter()
+    _compile(_FIRST)
     if available_jobs() > 1 and not all_compiled():
-        code = f"import sys; sys.path[:] = {sys.path!r}; import {__name__} as warm; warm.compile_in_time()"
-        other = subprocess.Popen([sys.executable, "-c", code])
+        other = get_context("fork").Process(target=_compile, args=(_IN_TIME,))
+        other.start()
         try:
             _compile(_OF_ORBITS)
-            other.wait()
+            other.join()
         finally:
             other.kill()
         for _, call in _IN_TIME:  # what the other process has compiled is read here
