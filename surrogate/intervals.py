@@ -87,8 +87,9 @@ class Intervals:
     ) -> tuple[Floats, Floats, Integers]:
         """Return ends (O, M) and groups (M,), see `intervals_of`."""
         own = np.zeros((len(features), ROBOT_NUMBERS)) if robots is None else robots
-        numbers: Any = map(np.ascontiguousarray, (features, own, outputs))  # one type of array, compiled once
-        return intervals_of(*self._stacked, kinds, places, *numbers)
+        of_robots = map(np.ascontiguousarray, (features, own, outputs))  # one type of array, compiled once
+        arguments: Any = (*self._stacked, kinds, places, *of_robots)
+        return intervals_of(*arguments)
 
     @cached_property
     def _stacked(self) -> Any:
