@@ -10,7 +10,7 @@ import shlex
 import shutil
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import chdir, redirect_stderr, redirect_stdout
@@ -52,9 +52,8 @@ def run_demo(out: str | Path) -> None:
     folder = page.parent / "demo"
     folder.mkdir(parents=True, exist_ok=True)
     compile_once()
-    _write_hidden(folder)
     shutil.rmtree(folder / "sweep", ignore_errors=True)  # an earlier demo's rows, perhaps of another version
-    write_page(page, run_steps(CHAINS, folder), time.perf_counter() - began)
+    write_page(page, run_steps(CHAINS, folder, _write_hidden), time.perf_counter() - began)
     print(f"done in {time.perf_counter() - began:.0f} s -> {page}")
 
 
@@ -81,25 +80,34 @@ def _film(track: Path) -> None:
     write_csv(dict(zip(LAB, (time, *seen.T), strict=True)), track.with_name("film.csv"), digits=6)
 
 
-def run_steps(chains: Sequence[Sequence[Step]], folder: Path) -> list[Done]:
+def run_steps(
+    chains: Sequence[Sequence[Step]], folder: Path, prepare: Callable[[Path], None] | None = None
+) -> list[Done]:
     """Run the first chain, then all others side by side; print their commands with what these print.
+
+    Args:
+        chains: of steps.
+        folder: where the commands run.
+        prepare: makes what the others need, of the folder, beside the first chain.
 
     Raises:
         InputError: a command fails.
     """
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # in each process
     first, *others = chains
-    # A process runs one command after another, so it imports once. The chain of most commands takes longest.
+    longest_first = sorted(range(len(others)), key=lambda i: -sum(len(step.commands) for step in others[i]))
+    done = list[Done]()
+    # A process runs one command after another, so it imports once.
     with (
         progress_bar("demo", total=sum(map(len, chains)), unit="step") as shown,
         ProcessPoolExecutor(available_jobs(), get_context("forkserver")) as pool,
     ):
-        running = {0: pool.submit(_run_chain, first, folder)}
-        running[0].result()
-        for place in sorted(range(len(others)), key=lambda i: -sum(len(step.commands) for step in others[i])):
-            running[1 + place] = pool.submit(_run_chain, others[place], folder)
-        done = list[Done]()
         try:
+            running = {0: pool.submit(_run_chain, first, folder)}
+            if prepare:
+                pool.submit(prepare, folder).result()
+            running[0].result()
+            running |= {1 + i: pool.submit(_run_chain, others[i], folder) for i in longest_first}
             for place in range(len(chains)):
                 steps = running[place].result()
                 done += steps

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 import shlex
+import signal
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
@@ -103,6 +105,16 @@ def test_steps_print_their_commands_in_order_or_fail(tmp_path: Path, capfd: pyte
     done = run_steps([(first,), *others], tmp_path)
     assert [each.step.title for each in done] == ["first", "other 0", "other 1"]
     assert [line.split()[0] for line in done[1].lines()] == ["$", "softflagella", "$", "vehicle"]
+
+
+def _die(folder: Path) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_killed_process_of_the_demo_is_one_line(tmp_path: Path) -> None:
+    step = Step("first", "", ("robot paper-control --out robot.toml",), {})
+    with pytest.raises(InputError, match="was killed; perhaps the machine ran out of memory"):
+        run_steps([(step,)], tmp_path, _die)
 
 
 def test_a_swim_is_filmed_with_errors_half_of_which_are_slow(tmp_path: Path) -> None:
