@@ -171,7 +171,11 @@ def test_a_lab_looks_at_the_robot_and_stops_it(browser: Any, tank_files: Path) -
     seen = page.locator("#facts").inner_text()
     assert "cm" in seen
     assert "degrees" in seen
-    assert page.evaluate("document.querySelector('#picture').naturalWidth") == 480
+    width = page.evaluate(  # a picture has none until it is there as a whole
+        "new Promise((done) => document.querySelector('#picture')"
+        ".addEventListener('load', (event) => done(event.target.naturalWidth), { once: true }))"
+    )
+    assert width == 480
     band = float(page.locator("#band").get_attribute("stroke-width"))
     assert band > 1
     centre = page.evaluate(
