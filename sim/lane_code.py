@@ -2,7 +2,8 @@
 
 A vector is LLVM's <W x double>; arrays of vectors need not be aligned. Instructions carry no flags of fast
 mathematics, so LLVM neither reorders nor fuses them. Do not `.copy()` an array of vectors: numba would then take
-the copy for aligned, which it is not.
+the copy for aligned, which it is not. An index of such an array must not be negative: numba's check for that is
+left out, since robots would take a tenth longer.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from numba.core.cgutils import get_or_insert_function, unpack_tuple
 from numba.core.imputils import impl_ret_borrowed
 from numba.core.typeconv import Conversion
 from numba.extending import lower_builtin, lower_cast, models, overload, register_model, type_callable
-from numba.np.arrayobj import make_array, populate_array
+from numba.np.arrayobj import getitem_array_tuple, getitem_arraynd_intp, make_array, populate_array, setitem_array
 
 from sim import lanes as plain
 
@@ -298,57 +299,20 @@ def _tuple_like(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return context.make_tuple(builder, kind, [builder.load(place, align=8) for place in places])
 
 
-def _place(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    """Return the address of entry (i, j); numba's own allows for negative i and j, which takes longer."""
-    matrix = make_array(sig.args[0])(context, builder, args[0])
-    columns = unpack_tuple(builder, matrix.shape)[1]
-    return builder.gep(matrix.data, [builder.add(builder.mul(args[1], columns), args[2])])
+def _without_wraparound(code: Any) -> Any:
+    """Make numba's code of an entry or row of vectors for indices that are not negative, so without a check."""
+
+    def entry(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        array, index, *value = sig.args
+        kinds = set(getattr(index, "types", (index,)))
+        if isinstance(array.dtype, Lanes) and all(isinstance(kind, types.Integer) for kind in kinds):
+            unsigned = types.uintp if index in kinds else types.UniTuple(types.uintp, len(index))
+            sig = sig.return_type(array, unsigned, *value)
+        return code(context, builder, sig, args)
+
+    return entry
 
 
-def _columns_kind(matrix: Any) -> Any:
-    return matrix.dtype if isinstance(matrix.dtype, Lanes) else Lanes(plain.width())
-
-
-@_teach(plain.columns, lambda matrix: _columns_kind(matrix)(matrix))
-def _columns(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return constant(sig.return_type, 0.0)
-
-
-def _some_columns(context: Any, builder: Any, sig: Any, args: Any, kind: Any) -> Any:
-    """Return the address of columns of a matrix, and which of them are there; None if the value is an entry."""
-    place = _place(context, builder, sig, args)
-    if kind == sig.args[0].dtype:
-        return place, None
-    counts = _in_all(builder, args[3], kind.width)
-    there = builder.icmp_signed("<", ir.Constant(counts.type, list(range(kind.width))), counts)
-    return builder.bitcast(place, context.get_data_type(kind).as_pointer()), there
-
-
-def _masked(builder: Any, name: str, result: Any, arguments: Any) -> Any:
-    """Call LLVM's function that reads or writes some entries of a vector, which are not aligned to more than 8."""
-    kind = ir.FunctionType(result, [argument.type for argument in arguments])
-    return builder.call(get_or_insert_function(builder.module, kind, name), arguments)
-
-
-_ALIGNED = ir.Constant(ir.IntType(32), 8)
-_PLACE = types.intp, types.intp, types.int64
-
-
-@_teach(plain.load, lambda matrix, i, j, count, like: like(matrix, *_PLACE, like))
-def _load(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    place, there = _some_columns(context, builder, sig, args, sig.return_type)
-    if there is None:
-        return builder.load(place, align=8)
-    name, zero = f"v{sig.return_type.width}f64", constant(sig.return_type, 0.0)
-    return _masked(builder, f"llvm.masked.load.{name}.p0{name}", zero.type, [place, _ALIGNED, there, zero])
-
-
-@_teach(plain.store, lambda matrix, i, j, count, value: types.void(matrix, *_PLACE, value))
-def _store(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    place, there = _some_columns(context, builder, sig, args, sig.args[4])
-    if there is None:
-        builder.store(args[4], place, align=8)
-    else:
-        name, arguments = f"v{sig.args[4].width}f64", [args[4], place, _ALIGNED, there]
-        _masked(builder, f"llvm.masked.store.{name}.p0{name}", ir.VoidType(), arguments)
-    return context.get_dummy_value()
+for _index, _getter in ((types.Integer, getitem_arraynd_intp), (types.UniTuple, getitem_array_tuple)):
+    lower_builtin(operator.getitem, types.Array, _index)(_without_wraparound(_getter))
+    lower_builtin(operator.setitem, types.Array, _index, types.Any)(_without_wraparound(setitem_array))

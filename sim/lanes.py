@@ -2,10 +2,9 @@
 
 A compiled loop works on arrays of vectors with W lanes, a group of W robots; a robot alone is in the first lane of
 a group. Vectors are added, multiplied and compared like numbers; so a formula for one robot is one for a group as
-well. In the products of one robot's matrices the lanes are columns (`columns`). A lane never sees another lane. So
-the result of a robot depends neither on its neighbours in a group nor on W: operations are those of IEEE 754, in
-the order of the source, and products are only fused where the source says so (`fma`). Such loops are compiled by
-`sim.jit.compiled`.
+well. A lane never sees another lane. So the result of a robot depends neither on its neighbours in a group nor on
+W: operations are those of IEEE 754, in the order of the source, and products are only fused where the source says
+so (`fma`). Such loops are compiled by `sim.jit.compiled`.
 
 A condition on lanes is a vector of 1 (true) and 0 (false), by which `choose` picks.
 
@@ -95,18 +94,3 @@ def smaller(a: Any, b: Any) -> Any:
 def somewhere(condition: Any) -> bool:
     """Tell whether a condition is true in any lane."""
     return bool(condition != 0)
-
-
-def columns(matrix: Any) -> Any:
-    """Return zero in as many columns of a matrix as a vector holds: W of plain numbers, one of vectors."""
-    return 0.0
-
-
-def load(matrix: Any, i: int, j: int, count: int, like: Any) -> Any:
-    """Return entry (i, j) of a matrix in C order and the columns after it that `like` has, `count` at most."""
-    return matrix[i, j]
-
-
-def store(matrix: Any, i: int, j: int, count: int, value: Any) -> None:
-    """Set entry (i, j) of a matrix in C order and the columns after it that the value has, `count` at most."""
-    matrix[i, j] = value

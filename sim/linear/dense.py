@@ -1,7 +1,6 @@
-"""Small dense matrices in compiled loops: products, inverse, and elimination with row exchanges.
+"""Small dense matrices of vectors in compiled loops: products, inverse, and elimination with row exchanges.
 
-They are made of vectors with a lane for each robot (`sim.lanes`), or of plain numbers, of which products then take
-as many columns at a time as a vector has lanes. Each entry of a product is summed in the same
+Each entry is a vector with a lane for each robot (`sim.lanes`). Each entry of a product is summed in the same
 order by fused operations. Three rows and four columns are in registers at a time; four columns go through all rows
 before the next ones, so that they stay in the nearest cache. Matrices have 3 K rows. Inverses are Gauss-Jordan
 with 3×3 pivots.
@@ -13,7 +12,7 @@ from typing import Any
 
 from common.arrays import Floats
 from sim.jit import borrowing, formula
-from sim.lanes import choose, columns, fma, lane_count, less, load, somewhere, store
+from sim.lanes import choose, fma, less, somewhere
 from sim.linear.blocks import block_at
 from sim.linear.vectors import Matrix, Vector, inverse, negative
 
@@ -34,31 +33,19 @@ def subtract_product(a: Floats, b: Floats, from_b: int, c: Floats, from_c: int, 
 
 @borrowing
 def _multiply(a: Floats, b: Floats, from_b: int, c: Floats, from_c: int, count: int, subtract: bool) -> None:
-    zero = columns(a)
-    step = columns_in(zero, a)
-    whole = count - count % (4 * step)
-    for j in range(0, whole, 4 * step):
+    whole = count - count % 4
+    for j in range(0, whole, 4):
         for i in range(0, a.shape[0], 3):
-            _four_columns(a, b, from_b + j, c, from_c + j, i, zero, subtract)
-    for j in range(whole, count, step):
+            _four_columns(a, b, from_b + j, c, from_c + j, i, subtract)
+    for j in range(whole, count):
         for i in range(0, a.shape[0], 3):
-            _one_column(a, b, from_b + j, c, from_c + j, i, count - j, zero, subtract)
+            _one_column(a, b, from_b + j, c, from_c + j, i, subtract)
 
 
 @formula
-def columns_in(value: Any, matrix: Any) -> Any:
-    """Count the columns of a matrix that a value has: W columns of plain numbers, one of vectors."""
-    return lane_count(value) // lane_count(matrix[0, 0])
-
-
-@formula
-def _four(c: Any, i: Any, at: Any, like: Any) -> _Four:
-    """Return four times the columns that `like` has, of a row."""
-    n = columns_in(like, c)
-    return (
-        load(c, i, at, n, like), load(c, i, at + n, n, like), load(c, i, at + 2 * n, n, like),
-        load(c, i, at + 3 * n, n, like),
-    )  # fmt: skip
+def _four(c: Any, i: Any, j: Any) -> _Four:
+    """Return four entries of a row."""
+    return c[i, j], c[i, j + 1], c[i, j + 2], c[i, j + 3]
 
 
 @formula
@@ -68,23 +55,19 @@ def _add_four(x: Any, w: _Four, p: _Four) -> _Four:
 
 
 @formula
-def _put_four(c: Any, i: Any, at: Any, p: _Four) -> None:
+def _put_four(c: Any, i: Any, j: Any, p: _Four) -> None:
     """Set what `_four` returns."""
-    n = columns_in(p[0], c)
-    store(c, i, at, n, p[0])
-    store(c, i, at + n, n, p[1])
-    store(c, i, at + 2 * n, n, p[2])
-    store(c, i, at + 3 * n, n, p[3])
+    c[i, j], c[i, j + 1], c[i, j + 2], c[i, j + 3] = p
 
 
 @formula
-def _four_columns(a: Any, b: Any, from_b: Any, c: Any, from_c: Any, i: Any, zero: Any, subtract: Any) -> None:
-    """Compute four times the columns that `zero` has, in three rows."""
-    p = q = r = (zero, zero, zero, zero)
+def _four_columns(a: Any, b: Any, from_b: Any, c: Any, from_c: Any, i: Any, subtract: Any) -> None:
+    """Compute four columns in three rows."""
+    p = q = r = (0.0, 0.0, 0.0, 0.0)
     if subtract:
-        p, q, r = _four(c, i, from_c, zero), _four(c, i + 1, from_c, zero), _four(c, i + 2, from_c, zero)
+        p, q, r = _four(c, i, from_c), _four(c, i + 1, from_c), _four(c, i + 2, from_c)
     for k in range(a.shape[1]):
-        w = _four(b, k, from_b, zero)
+        w = _four(b, k, from_b)
         p = _add_four(_signed(a[i, k], subtract), w, p)
         q = _add_four(_signed(a[i + 1, k], subtract), w, q)
         r = _add_four(_signed(a[i + 2, k], subtract), w, r)
@@ -100,33 +83,29 @@ def _signed(x: Any, subtract: Any) -> Any:
 
 
 @formula
-def _one_column(
-    a: Any, b: Any, from_b: Any, c: Any, from_c: Any, i: Any, count: Any, zero: Any, subtract: Any
-) -> None:
-    """Compute the columns that `zero` has, `count` at most, in three rows."""
-    p = q = r = zero
+def _one_column(a: Any, b: Any, j_b: Any, c: Any, j_c: Any, i: Any, subtract: Any) -> None:
+    """Compute a column in three rows."""
+    p = q = r = 0.0
     if subtract:
-        p, q, r = _three(c, i, from_c, count, zero)
+        p, q, r = _three(c, i, j_c)
     for k in range(a.shape[1]):
-        w = load(b, k, from_b, count, zero)
+        w = b[k, j_b]
         p = fma(_signed(a[i, k], subtract), w, p)
         q = fma(_signed(a[i + 1, k], subtract), w, q)
         r = fma(_signed(a[i + 2, k], subtract), w, r)
-    _put_three(c, i, from_c, count, (p, q, r))
+    _put_three(c, i, j_c, (p, q, r))
 
 
 @formula
-def _three(c: Any, row: Any, at: Any, count: Any, like: Any) -> Vector:
-    """Return three rows of the columns that `like` has, `count` at most."""
-    return load(c, row, at, count, like), load(c, row + 1, at, count, like), load(c, row + 2, at, count, like)
+def _three(c: Any, i: Any, j: Any) -> Vector:
+    """Return three entries of a column."""
+    return c[i, j], c[i + 1, j], c[i + 2, j]
 
 
 @formula
-def _put_three(c: Any, row: Any, at: Any, count: Any, v: Vector) -> None:
-    """Set three rows of the columns that the values have, `count` at most."""
-    store(c, row, at, count, v[0])
-    store(c, row + 1, at, count, v[1])
-    store(c, row + 2, at, count, v[2])
+def _put_three(c: Any, i: Any, j: Any, v: Vector) -> None:
+    """Set what `_three` returns."""
+    c[i, j], c[i + 1, j], c[i + 2, j] = v
 
 
 @borrowing
@@ -134,14 +113,12 @@ def multiply_block(
     a: Matrix, b: Floats, row_b: int, from_b: int, c: Floats, row_c: int, from_c: int, count: int
 ) -> None:
     """Set `count` columns of three rows of c to a 3×3 block times those of three rows of b; c may be b."""
-    zero = columns(b)
-    for j in range(0, count, columns_in(zero, b)):
-        v = _three(b, row_b, from_b + j, count - j, zero)
+    for j in range(count):
+        v = _three(b, row_b, from_b + j)
         _put_three(
             c,
             row_c,
             from_c + j,
-            count - j,
             (
                 fma(a[0][0], v[0], fma(a[0][1], v[1], a[0][2] * v[2])),
                 fma(a[1][0], v[0], fma(a[1][1], v[1], a[1][2] * v[2])),
@@ -155,14 +132,12 @@ def add_block_product(
     a: Matrix, b: Floats, row_b: int, from_b: int, c: Floats, row_c: int, from_c: int, count: int
 ) -> None:
     """Add a 3×3 block times `count` columns of three rows of b to those of three rows of c."""
-    zero = columns(b)
-    for j in range(0, count, columns_in(zero, b)):
-        v, p = _three(b, row_b, from_b + j, count - j, zero), _three(c, row_c, from_c + j, count - j, zero)
+    for j in range(count):
+        v, p = _three(b, row_b, from_b + j), _three(c, row_c, from_c + j)
         _put_three(
             c,
             row_c,
             from_c + j,
-            count - j,
             (
                 fma(a[0][0], v[0], fma(a[0][1], v[1], fma(a[0][2], v[2], p[0]))),
                 fma(a[1][0], v[0], fma(a[1][1], v[1], fma(a[1][2], v[2], p[1]))),
@@ -250,10 +225,8 @@ def _exchange(a: Floats, k: int, i: int, first: int, where: Any) -> None:
 @borrowing
 def _subtract(a: Floats, k: int, i: int, first: int, factor: Any) -> None:
     """Subtract a multiple of row k from row i, from column `first` on."""
-    zero, count = columns(a), a.shape[1]
-    for j in range(first, count, columns_in(zero, a)):
-        left = count - j
-        store(a, i, j, left, fma(-factor, load(a, k, j, left, zero), load(a, i, j, left, zero)))
+    for j in range(first, a.shape[1]):
+        a[i, j] = fma(-factor, a[k, j], a[i, j])
 
 
 @borrowing
