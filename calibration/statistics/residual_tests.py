@@ -35,6 +35,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -63,6 +64,7 @@ _AT_ONCE, _OF_TRACES_AT_ONCE = 50, 200  # draws
 _FEWEST_DRAWS = 100  # where no time is left
 _MOST_PLACES, _LANDMARKS = 1000, 200  # distinct inputs between which a kernel is computed, and those of more
 _SEEN = 3e-3  # share of the largest eigenvalue of the kernel between these that counts
+_ROUNDING = 1e-12  # of the kernel between all inputs
 _VALUES = 2_000_000  # of the draws that are made at once
 
 
@@ -320,13 +322,19 @@ def kernel_factor(inputs: Floats) -> Floats:
 
     Of many distinct inputs it is an approximation by some of them (Nyström 1930).
     """
+    return _kernel_factor(inputs.tobytes(), inputs.shape)
+
+
+@lru_cache(maxsize=2)  # all tests of a calibration are of the same runs
+def _kernel_factor(numbers: bytes, shape: tuple[int, int]) -> Floats:
+    inputs = np.frombuffer(numbers).reshape(shape)
     kinds, place = np.unique(inputs.round(9), axis=0, return_inverse=True)
     several = len(kinds) > _MOST_PLACES
     landmarks = kinds[np.linspace(0, len(kinds) - 1, _LANDMARKS).astype(int)] if several else kinds
     values, vectors = np.linalg.eigh(_kernel(landmarks, landmarks))
+    seen = values > (_SEEN if several else _ROUNDING) * values[-1]
     if not several:
-        return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0)))[place.reshape(-1)])
-    seen = values > _SEEN * values[-1]
+        return np.asarray((vectors[:, seen] * np.sqrt(values[seen]))[place.reshape(-1)])
     return np.asarray((_kernel(kinds, landmarks) @ (vectors[:, seen] / np.sqrt(values[seen])))[place.reshape(-1)])
 
 
