@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import pickle
 from collections.abc import Callable
-from functools import cache, wraps
+from functools import wraps
 from hashlib import sha256
 from pathlib import Path
 from tempfile import mkdtemp
@@ -25,16 +25,20 @@ FOLDER = Path(os.environ[SESSION])
 def shared(make: Callable[Given, Result]) -> Callable[Given, Result]:
     """Let one process of the session make each result of a function, for all others to read; nobody may change it.
 
-    The arguments must be hashable and tell the result by their `repr`. The result is pickled.
+    Arguments are told apart by their pickles; so is the result kept.
     """
+    known: dict[str, Result] = {}
 
     @wraps(make)
     def result(*given: Any, **options: Any) -> Result:
-        words = f"{make.__module__}.{make.__qualname__} {given} {sorted(options.items())}"
-        file = FOLDER / sha256(words.encode()).hexdigest()
-        with FileLock(f"{file}.lock"):
-            if not file.exists():
-                file.write_bytes(pickle.dumps(make(*given, **options)))
-        return cast(Result, pickle.loads(file.read_bytes()))
+        asked = make.__module__, make.__qualname__, given, sorted(options.items())
+        name = sha256(pickle.dumps(asked)).hexdigest()
+        if name not in known:
+            with FileLock(FOLDER / f"{name}.lock"):
+                file = FOLDER / name
+                if not file.exists():
+                    file.write_bytes(pickle.dumps(make(*given, **options)))
+            known[name] = pickle.loads(file.read_bytes())
+        return known[name]
 
-    return cast(Callable[Given, Result], cache(result))
+    return cast(Callable[Given, Result], result)

@@ -17,9 +17,11 @@ from common.arrays import Flags, Floats
 from planner.planning.plan import Plan
 from sim.mechanics import planar
 from sim.model.robot import Robot
+from sim.model.schedule import Schedule
 from sim.motion.replay import stretches
 from sim.motion.run import Resolution
 from sim.solve.march import YAW, X, Y
+from tests.shared import shared
 
 Spans = tuple[tuple[float, float], ...]  # begin and end of each [s], the motor starts at 0
 
@@ -65,11 +67,17 @@ class Swum(NamedTuple):
 def swum(truth: Robot, plan: Plan, resolution: Resolution | None = None) -> Swum:
     """Simulate a robot that swims a plan of any robot; mesh and step by default as of a replay."""
     schedule, length, second = plan.schedule(truth), truth.length_scale, truth.time_scale
-    parts = list(stretches(schedule, resolution=resolution))
-    times = np.concatenate([[0.0], *(part.times for part in parts)])
-    moved = np.concatenate([np.zeros((1, 6)), *(part.poses for part in parts)])[:, [X, Y, YAW]]
+    times, moved = _replayed(schedule, resolution)
     poses = planar.compose(np.array(schedule.start), moved) * [length, length, 1.0]
     return Swum(second * times, poses, second * np.append(0.0, np.cumsum(schedule.dwells)))
+
+
+@shared
+def _replayed(schedule: Schedule, resolution: Resolution | None) -> tuple[Floats, Floats]:
+    """Return the times (K,) of a replay, and x, y and yaw (K, 3) at them."""
+    parts = list(stretches(schedule, resolution=resolution))
+    times = np.concatenate([[0.0], *(part.times for part in parts)])
+    return times, np.concatenate([np.zeros((1, 6)), *(part.poses for part in parts)])[:, [X, Y, YAW]]
 
 
 def make_track(
