@@ -405,9 +405,8 @@ class Detector:
         count, labels, _, centres = self._cv.connectedComponentsWithStats(
             self._cv.dilate((weights > 0).astype(np.uint8), np.ones((3, 3), np.uint8))
         )
-        strengths = np.zeros(count)
-        np.maximum.at(strengths, labels.ravel(), weights.ravel())
-        strengths[0] = 0
+        strengths, seen = np.zeros(count), labels > 0
+        np.maximum.at(strengths, labels[seen], weights[seen])
         order = np.argsort(-strengths)[:_CANDIDATES]
         return [(float(strengths[label]), centres[label]) for label in order if strengths[label] > 0]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import time
 import tracemalloc
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -460,7 +461,7 @@ def test_a_large_film_is_learnt_from_in_small_pictures(tmp_path: Path) -> None:
     """It takes fewer bytes than twelve of its pictures have; progress begins before they are looked at."""
     tank, path, told = small(), tmp_path / "film.avi", list[int]()
     written(path, (cv2.resize(picture, (3840, 2880)) for picture in swimming(tank, 24)))
-    setup = setup_of(replace(tank, width=3840, height=2880, scale=0.001 / 12), tmp_path)
+    setup = setup_of(replace(tank, width=3840, height=2880, scale=0.001 / 12, fine=1), tmp_path)
 
     def tell(done: int, count: int) -> None:
         if not told:
@@ -480,6 +481,6 @@ def test_a_frozen_camera_shows_no_robot(tmp_path: Path) -> None:
     tank, path = small(), tmp_path / "film.avi"
     setup_of(tank, tmp_path)
     written(path, (FROZEN + 5) * [tank.frame(SWUM, 0.0)], 50)
-    sights = [*watch(str(path), str(tmp_path / "view.toml"), "1", TAIL, 0.0)(lambda: 1e9)]
+    sights = [*watch(str(path), str(tmp_path / "view.toml"), "1", TAIL, 0.0)(time.monotonic)]
     assert [sight.pose is not None for sight in sights] == FROZEN * [True] + 5 * [False]
     assert sights[-1].why.endswith("is the camera frozen?")

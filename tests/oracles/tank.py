@@ -19,6 +19,7 @@ from common.arrays import Floats
 RADIUS, LENGTH, TAIL = 0.016, 0.06, 0.11  # m, of the head and the tails
 BAND, APART = 0.007, 0.044  # m, width of a band, distance of the bands
 PAINT = {"red": (40, 40, 205), "green": (60, 170, 60), "blue": (200, 90, 30), "yellow": (40, 205, 215)}  # BGR
+COARSE = 8  # samples, each way, between those that are asked whether a robot is near
 Motion = Callable[[float], tuple[float, float, float, float, float]]  # t -> x, y [m], ψ, φ_head, φ_tails [rad]
 
 
@@ -84,7 +85,7 @@ class Tank:
         """Trace pixels (..., 2) back through the lens, to points one focal length ahead."""
         seen = (pixels - np.array([(self.width - 1) / 2, (self.height - 1) / 2])) / self.focal
         ray = seen
-        for _ in range(12):
+        for _ in range(12 if self.distortion else 0):
             ray = seen / (1 + self.distortion * (ray**2).sum(-1, keepdims=True))
         return ray
 
@@ -151,11 +152,13 @@ class Tank:
         axis, half = np.array([np.cos(now[2]), np.sin(now[2])]), (LENGTH + TAIL) / 2
         middle = (now + later)[:2] / 2 - TAIL / 2 * axis
         extent = np.abs(axis) * half + np.abs(axis[::-1]) * RADIUS + np.abs(later - now)[:2] + 0.006
-        near = (np.abs(self._x - middle[0]) < extent[0]) & (np.abs(self._y - middle[1]) < extent[1])
-        rows, columns = (np.flatnonzero(near.any(axis=along)) for along in (1, 0))
+        extent += COARSE * self.scale / self.fine
+        x, y = self._x[::COARSE, ::COARSE], self._y[::COARSE, ::COARSE]
+        near = (np.abs(x - middle[0]) < extent[0]) & (np.abs(y - middle[1]) < extent[1])
+        rows, columns = (COARSE * np.flatnonzero(near.any(axis=along)) for along in (1, 0))
         if not len(rows):
             return
-        box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+        box = tuple(slice(max(0, each[0] - COARSE), each[-1] + COARSE + 1) for each in (rows, columns))
         picture, light = picture[box], self._light[box]
         x, y, heading, head, tails = (
             a + (b - a) * self._row[box] if self.readout else float(a) for a, b in zip(now, later, strict=True)

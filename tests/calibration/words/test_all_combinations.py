@@ -27,7 +27,7 @@ from calibration.words.render import (
     say_laws,
     sentence,
 )
-from tests.calibration.words.test_words import in_report, laws_of_five_places
+from tests.calibration.words.test_words import in_report, laws_of_five_places, read
 from tests.oracles.falling_balls import balls, falls
 from tests.shared import shared
 
@@ -211,17 +211,19 @@ def test_every_combination_is_said_in_whole_sentences_with_one_advice(verdict: s
         advice, steps = record["advice"], next_steps(record)
         advised.add(advice)
         said, errors = sentence(record), errors_in_words(record)
-        seen = in_report({**record, "sentence": said, "next_steps": steps})
+        report = sections({**record, "sentence": said, "next_steps": steps}, {})
+        seen = read(report)
         first, *experiments = steps
         assert MODEL_TO_USE.match(first), first
         brief, short = in_brief(record), next_in_short(record)
-        assert len(headline(record).split()) <= 25, headline(record)
+        title = headline(record)
+        assert len(title.split()) <= 25, title
         assert len(brief) <= 4
         assert 1 <= len(badges(record)) <= 5
         assert MODEL_TO_USE.match(short[0]), short
         assert max(len(step.split()) for step in short) <= 20, short
-        opened = sections({**record, "sentence": said, "next_steps": steps}, {}).partition("<h2>")[0]
-        assert len(f"{headline(record)} {TAG.sub(' ', opened)}".split()) <= 90 - OF_THE_LEAD, opened
+        opened = report.partition("<h2>")[0]
+        assert len(f"{title} {TAG.sub(' ', opened)}".split()) <= 90 - OF_THE_LEAD, opened
         for text in (said, errors, *steps, *brief, *short):
             assert not SPOILT.search(text), text
         assert all(text and text.endswith(".") for text in (said, *steps)), steps

@@ -128,7 +128,12 @@ def test_every_branch_of_the_next_steps(name: str, changes: dict[str, Any], said
 
 def in_report(record: dict[str, Any]) -> str:
     """What a reader sees of the sections of a report."""
-    return " ".join(unescape(re.sub("<[^>]*>", " ", sections(record, {}))).split())
+    return read(sections(record, {}))
+
+
+def read(markup: str) -> str:
+    """What a reader sees of HTML."""
+    return " ".join(unescape(re.sub("<[^>]*>", " ", markup)).split())
 
 
 def test_rivals_are_told_apart_by_runs_that_are_worth_making_and_a_command() -> None:
