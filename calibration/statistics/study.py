@@ -6,7 +6,8 @@ estimated. Its variance is taken to be `gls.UNKNOWN_RATIO`, so a shift of all it
 
 **Outliers** are runs that are far from their own repeats, for example because of a misplaced decimal point. If, in
 one output, the runs of a condition are more than `FAR` robust standard deviations apart, the run that is farthest
-from the model as given is excluded. A missing effect does not cause this: it changes all repeats alike.
+from the model as given is excluded. A missing effect does not cause this: it changes all repeats alike. Where more
+than half of a condition would go, none does: its runs scatter more than those of others, and get less weight.
 
 **Held-out runs** tell the error of a model, and whether they agree with it. In the end it is fitted to all runs.
 """
@@ -194,19 +195,22 @@ def find_outliers(data: Runs, prediction: Floats) -> tuple[Flags, tuple[Excluded
     # The deviation of two repeats from their median is half their difference.
     pairs = np.sqrt(np.mean([(len(g) - 1) / len(g) for g in groups]))
     scatter = _MAD * np.median(np.abs(centred), 0) / pairs
-    excluded = []
-    for group in groups:
+    excluded: list[Excluded] = []
+    for all_repeats in groups:
+        group, apart = all_repeats, list[Excluded]()
         while len(group) > 1:
             spread = np.ptp(y[group], axis=0) / np.maximum(scatter, 1e-300)
             worst = int(np.argmax(spread))
             if spread[worst] < FAR or scatter[worst] == 0:
                 break
             out = group[np.argmax(np.abs(residual[group, worst]))]
-            bad[out] = True
             far = f"{data.outputs[worst]} is far from its repeat{{}}"
             distance = f" ({spread[worst]:.0f} standard deviations)"
-            excluded.append(Excluded(far, data.row_name(int(out)), distance))
+            apart.append(Excluded(far, data.row_name(int(out)), distance))
             group = group[group != out]
+        if 2 * len(apart) <= len(all_repeats):  # else the condition scatters more than others
+            bad[np.setdiff1d(all_repeats, group)] = True
+            excluded += apart
     return bad, tuple(excluded)
 
 

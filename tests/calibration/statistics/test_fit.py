@@ -337,18 +337,28 @@ def test_neighbours_join_short_sessions(sizes: list[int], held_out: list[int]) -
     assert not set(session[held]) & set(session[~held])
 
 
-def test_runs_that_were_mistracked_are_excluded_and_clean_ones_are_not() -> None:
-    def pairs(seed: int) -> Any:
-        """200 conditions of two runs, with two outputs of unit noise."""
-        y = np.random.default_rng(seed).normal(size=(400, 2))
-        condition = np.repeat(np.arange(200), 2)
-        outputs = ("R_yr", "theta")
-        return SimpleNamespace(
-            y=y, condition=condition, session=0 * condition, row_name="row {}".format, outputs=outputs,
-            unit_checked={}, trace=None, gaps=np.zeros(y.shape, dtype=bool),
-        )  # fmt: skip
+def repeats_of(condition: Any, seed: int) -> Any:
+    """Runs of some conditions (n,), with two outputs of unit noise."""
+    y = np.random.default_rng(seed).normal(size=(len(condition), 2))
+    return SimpleNamespace(
+        y=y, condition=condition, session=0 * condition, row_name="row {}".format, outputs=("R_yr", "theta"),
+        unit_checked={}, trace=None, gaps=np.zeros(y.shape, dtype=bool),
+    )  # fmt: skip
 
-    runs, effect = pairs(0), pairs(1)
+
+def test_a_condition_that_scatters_more_than_others_is_not_excluded_run_by_run() -> None:
+    """Of 22 readings near the limit of an assay 16 were taken for outliers; two wrong ones among 22 are some."""
+    runs = repeats_of(np.repeat(np.arange(8), 22), 0)
+    runs.y[:22] *= 30.0
+    runs.y[[30, 31]] += 40.0
+    bad, reasons = find_outliers(runs, np.zeros_like(runs.y))
+    assert np.flatnonzero(bad).tolist() == [30, 31]
+    assert len(reasons) == 2
+
+
+def test_runs_that_were_mistracked_are_excluded_and_clean_ones_are_not() -> None:
+    pairs = np.repeat(np.arange(200), 2)
+    runs, effect = repeats_of(pairs, 0), repeats_of(pairs, 1)
     mistracked = np.arange(0, 400, 40)
     assert not find_outliers(runs, np.zeros_like(runs.y))[0].any()
     runs.y[mistracked, 1] += 16.0
