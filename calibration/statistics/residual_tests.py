@@ -333,9 +333,11 @@ def _kernel_factor(numbers: bytes, shape: tuple[int, int]) -> Floats:
     landmarks = kinds[np.linspace(0, len(kinds) - 1, _LANDMARKS).astype(int)] if several else kinds
     values, vectors = np.linalg.eigh(_kernel(landmarks, landmarks))
     seen = values > (_SEEN if several else _ROUNDING) * values[-1]
-    if not several:
-        return np.asarray((vectors[:, seen] * np.sqrt(values[seen]))[place.reshape(-1)])
-    return np.asarray((_kernel(kinds, landmarks) @ (vectors[:, seen] / np.sqrt(values[seen])))[place.reshape(-1)])
+    vectors, lengths = vectors[:, seen], np.sqrt(values[seen])
+    rows = _kernel(kinds, landmarks) @ (vectors / lengths) if several else vectors * lengths
+    factor = np.asarray(rows[place.reshape(-1)])
+    factor.setflags(write=False)  # it is shared
+    return factor
 
 
 def _kernel(one: Floats, other: Floats) -> Floats:
